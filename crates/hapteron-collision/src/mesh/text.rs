@@ -1,0 +1,106 @@
+//! Words and numbers of text formats, with their lines.
+
+use super::error::{MeshError, MeshProblem};
+
+/// The lines of a file with their numbers, from 1; bytes that are not UTF-8 become replacement characters.
+pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, std::borrow::Cow<'_, str>)> {
+    bytes
+        .split(|&b| b == b'\n')
+        .enumerate()
+        .map(|(i, line)| (i + 1, String::from_utf8_lossy(line)))
+}
+
+/// All words of a file outside `#` comments, each with its line.
+pub(super) struct Words<'a> {
+    rest: &'a [u8],
+    line: usize,
+}
+
+impl<'a> Words<'a> {
+    pub(super) fn new(bytes: &'a [u8], line: usize) -> Self {
+        Self { rest: bytes, line }
+    }
+
+    /// The next word, or an error that says what is missing.
+    pub(super) fn next(&mut self, what: &'static str) -> Result<(usize, &'a str), MeshError> {
+        loop {
+            match self.rest.first() {
+                None => return Err(MeshError::at(self.line, MeshProblem::Truncated(what))),
+                Some(b'\n') => {
+                    self.line += 1;
+                    self.rest = &self.rest[1..];
+                }
+                Some(b'#') => {
+                    let end = self
+                        .rest
+                        .iter()
+                        .position(|&b| b == b'\n')
+                        .unwrap_or(self.rest.len());
+                    self.rest = &self.rest[end..];
+                }
+                Some(b) if b.is_ascii_whitespace() => self.rest = &self.rest[1..],
+                Some(_) => break,
+            }
+        }
+        let end = self
+            .rest
+            .iter()
+            .position(u8::is_ascii_whitespace)
+            .unwrap_or(self.rest.len());
+        let (word, rest) = self.rest.split_at(end);
+        self.rest = rest;
+        let word = std::str::from_utf8(word)
+            .map_err(|_| MeshError::at(self.line, MeshProblem::Syntax("the file is not text here".into())))?;
+        Ok((self.line, word))
+    }
+
+    pub(super) fn number<T: std::str::FromStr>(&mut self, what: &'static str) -> Result<T, MeshError> {
+        let (line, word) = self.next(what)?;
+        number(word, what).map_err(|p| MeshError::at(line, p))
+    }
+
+    pub(super) fn line(&self) -> usize {
+        self.line
+    }
+
+    /// The rest of the line that the last word is on.
+    pub(super) fn skip_line(&mut self) {
+        let end = self
+            .rest
+            .iter()
+            .position(|&b| b == b'\n')
+            .unwrap_or(self.rest.len());
+        self.rest = &self.rest[end..];
+    }
+
+    /// Bytes not yet read.
+    pub(super) fn remaining(&self) -> usize {
+        self.rest.len()
+    }
+}
+
+/// A number in a word.
+pub(super) fn number<T: std::str::FromStr>(word: &str, what: &'static str) -> Result<T, MeshProblem> {
+    word.parse().map_err(|_| MeshProblem::NotANumber {
+        what,
+        found: word.chars().take(40).collect(),
+    })
+}
+
+/// Refuses a count for which the rest of a file has no room, before anything is allocated for it.
+pub(super) fn check_count(
+    what: &'static str,
+    announced: u64,
+    remaining: usize,
+    least_bytes: usize,
+) -> Result<usize, MeshProblem> {
+    let room = (remaining / least_bytes.max(1)) as u64 + 1;
+    match usize::try_from(announced) {
+        Ok(count) if announced <= room => Ok(count),
+        _ => Err(MeshProblem::Lying {
+            what,
+            announced,
+            room,
+        }),
+    }
+}

@@ -1,0 +1,202 @@
+//! Exact contacts between two surfaces at full resolution.
+//!
+//! Every local minimum of the distance between two triangle meshes lies between a vertex and a face (or edge or vertex)
+//! or between two edges. So a query finds, for every vertex of either surface, its foot on the other one, as far as that
+//! is within the tolerance, with its side (the sign rule stands at [`Surface`]); and for pairs of edges their common
+//! perpendicular where it shows more than the vertices do. That covers all regions of the two surfaces that are
+//! closer than the tolerance with one contact at each vertex there, and its least distance is the exact one, at a
+//! fraction of the cost of listing all pairs of close triangles.
+
+mod feature;
+mod kernel;
+mod result;
+mod ridges;
+mod side;
+mod vertices;
+mod walk;
+
+use crate::contact::Contact;
+use crate::surface::Surface;
+use crate::vector::{self, Rigid};
+use nalgebra::Isometry3;
+use result::Sink;
+use walk::Walk;
+
+/// Share of the tolerance by which the near leaves are collected from farther away than needed, so that the next queries
+/// find them without a walk; and the number of steps like the last one that this should last for.
+const AHEAD: f64 = 0.5;
+const STEPS_AHEAD: f64 = 8.0;
+
+/// The two surfaces and where they are.
+#[derive(Clone, Copy)]
+struct Pair<'a> {
+    body: &'a Surface,
+    obstacle: &'a Surface,
+    /// From the body's mesh frame to the obstacle's.
+    motion: &'a Rigid,
+    inverse: &'a Rigid,
+    tolerance: f64,
+}
+
+impl Pair<'_> {
+    /// Covers the rounding of single-precision coordinates, in metres.
+    fn slack(&self) -> f64 {
+        1e-6 * (self.body.radius + self.obstacle.radius + vector::norm(self.motion.translation))
+    }
+}
+
+/// Memory of a query, to be kept for the next one on the same pair of surfaces, which is then faster: it remembers which
+/// parts were near and which triangles closest. It never changes a result by more than rounding. Use one for each pair.
+#[derive(Clone, Debug, Default)]
+pub struct QueryWorkspace {
+    walk: Walk,
+    collected: Option<Collected>,
+    ridges: ridges::Ridges,
+    body: side::Side,
+    obstacle: side::Side,
+    scratch: vertices::Scratch,
+    contacts: Vec<Contact>,
+}
+
+/// For which surfaces, pose and distance the near leaves have been collected.
+#[derive(Clone, Copy, Debug)]
+struct Collected {
+    surfaces: [u64; 2],
+    motion: Rigid,
+    reach: f64,
+    /// The pose of the last query.
+    last: Rigid,
+}
+
+impl QueryWorkspace {
+    /// An empty workspace.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Makes sure that the lists of near leaves hold all that can be within the tolerance.
+    fn collect(&mut self, pair: Pair<'_>) {
+        let surfaces = [pair.body.identity, pair.obstacle.identity];
+        let Some(root) = pair.body.nodes.first() else {
+            return;
+        };
+        let known = self.collected.filter(|known| known.surfaces == surfaces);
+        let mut step = 0.0;
+        if let Some(known) = known {
+            step = walk::displacement(root, &known.last, pair.motion);
+            let moved = walk::displacement(root, &known.motion, pair.motion);
+            if pair.tolerance + moved <= known.reach {
+                self.collected = Some(Collected {
+                    last: *pair.motion,
+                    ..known
+                });
+                return;
+            }
+        } else {
+            self.body.reset(pair.body);
+            self.obstacle.reset(pair.obstacle);
+        }
+        // Looking far ahead pays for a slow motion only, and not at all for a first query or a jump.
+        let ahead = if known.is_some() && step < AHEAD * pair.tolerance {
+            (STEPS_AHEAD * step).min(AHEAD * pair.tolerance)
+        } else {
+            0.0
+        };
+        let reach = pair.tolerance + ahead;
+        walk::walk(pair, reach, &mut self.walk);
+        self.collected = Some(Collected {
+            surfaces,
+            motion: *pair.motion,
+            reach,
+            last: *pair.motion,
+        });
+    }
+}
+
+/// What a query found.
+#[derive(Clone, Copy, Debug)]
+pub struct QueryResult<'a> {
+    /// Exact least distance of the surfaces, in metres, when it is within the tolerance; where they cross, the greatest
+    /// depth with a negative sign; infinite when nothing is within the tolerance.
+    pub min_distance: f64,
+    /// All contacts, in an order that depends on nothing but the surfaces and their poses.
+    pub contacts: &'a [Contact],
+}
+
+/// Finds where two surfaces are closer than `tolerance` (metres) or cross.
+///
+/// `world_from_body` and `world_from_obstacle` are the poses of the mesh frames in the world, and so are the contacts. A
+/// pose or tolerance that is not finite, or a tolerance that is not positive, finds nothing. Not for the haptic thread: the time
+/// depends on the contact.
+pub fn query<'a>(
+    body: &Surface,
+    world_from_body: &Isometry3<f64>,
+    obstacle: &Surface,
+    world_from_obstacle: &Isometry3<f64>,
+    tolerance: f64,
+    workspace: &'a mut QueryWorkspace,
+) -> QueryResult<'a> {
+    workspace.contacts.clear();
+    let relative = world_from_obstacle.inv_mul(world_from_body);
+    let valid =
+        tolerance > 0.0 && tolerance.is_finite() && is_finite(&relative) && is_finite(world_from_obstacle);
+    if !valid || body.nodes.is_empty() || obstacle.nodes.is_empty() {
+        return QueryResult {
+            min_distance: f64::INFINITY,
+            contacts: &workspace.contacts,
+        };
+    }
+    let motion = Rigid::from_isometry(&relative);
+    let inverse = Rigid::from_isometry(&relative.inverse());
+    let pair = Pair {
+        body,
+        obstacle,
+        motion: &motion,
+        inverse: &inverse,
+        tolerance,
+    };
+    workspace.collect(pair);
+    let QueryWorkspace {
+        walk,
+        ridges,
+        body: body_side,
+        obstacle: obstacle_side,
+        scratch,
+        contacts,
+        ..
+    } = workspace;
+    body_side.clear();
+    obstacle_side.clear();
+    ridges.clear(obstacle);
+    let world_from_obstacle = Rigid::from_isometry(world_from_obstacle);
+    let mut sink = Sink {
+        pair,
+        world_from_obstacle,
+        contacts,
+        least: f64::INFINITY,
+    };
+    vertices::of_body(pair, &walk.body, body_side, scratch, &mut sink);
+    vertices::of_obstacle(pair, &walk.obstacle, obstacle_side, scratch, &mut sink);
+    ridges::find(
+        pair,
+        &walk.body,
+        [body_side, obstacle_side],
+        ridges,
+        scratch,
+        &mut sink,
+    );
+    let min_distance = sink.least;
+    QueryResult {
+        min_distance,
+        contacts: &workspace.contacts,
+    }
+}
+
+fn is_finite(pose: &Isometry3<f64>) -> bool {
+    pose.translation
+        .vector
+        .iter()
+        .chain(pose.rotation.coords.iter())
+        .all(|c| c.is_finite())
+}

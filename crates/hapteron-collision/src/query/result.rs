@@ -1,0 +1,47 @@
+//! Collecting what a query finds.
+
+use super::Pair;
+use super::feature::Feature;
+use crate::contact::Contact;
+use crate::vector::{Rigid, Vec3};
+use nalgebra::Vector3;
+
+/// A contact in the obstacle's mesh frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    pub point_body: Vec3,
+    pub point_obstacle: Vec3,
+    /// Unit, outward from the body.
+    pub normal: Vec3,
+    pub depth: f64,
+    /// On the body and on the obstacle.
+    pub features: [Feature; 2],
+}
+
+/// Where contacts go: it turns them into the world frame and keeps the least distance.
+pub(super) struct Sink<'a> {
+    pub pair: Pair<'a>,
+    pub world_from_obstacle: Rigid,
+    pub contacts: &'a mut Vec<Contact>,
+    /// Signed; infinite until something is found.
+    pub least: f64,
+}
+
+impl Sink<'_> {
+    #[inline(always)]
+    pub(super) fn push(&mut self, found: Found) {
+        self.least = self.least.min(-found.depth);
+        let point_body = self.world_from_obstacle.point(found.point_body);
+        let point_obstacle = self.world_from_obstacle.point(found.point_obstacle);
+        let normal = self.world_from_obstacle.direction(found.normal);
+        self.contacts.push(Contact {
+            point_body: Vector3::from(point_body),
+            point_obstacle: Vector3::from(point_obstacle),
+            normal: Vector3::from(normal),
+            depth: found.depth,
+            weight: 1.0,
+            body_feature: found.features[0].number(self.pair.body),
+            obstacle_feature: found.features[1].number(self.pair.obstacle),
+        });
+    }
+}

@@ -1,0 +1,171 @@
+//! The frozen query structure of one mesh: triangles in blocks of eight, shared vertices and edges with their
+//! normals, and a flat eight-wide tree of boxes over the blocks. Built once, then never changed.
+
+mod build;
+mod topology;
+
+use crate::mesh::TriMesh;
+
+/// Triangles in one leaf of the tree, and lanes of one inner loop.
+pub(crate) const LANES: usize = 8;
+/// Marks a child of a [`Node`] as a leaf; the other bits are its index.
+pub(crate) const LEAF: u32 = 1 << 31;
+/// Marks an absent child of a [`Node`].
+pub(crate) const EMPTY: u32 = u32::MAX;
+
+/// What the two sides of an edge make of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum EdgeKind {
+    /// Two faces that bend away from each other, seen from outside: such an edge can touch another in its middle.
+    Convex,
+    /// Two faces in one plane or bent towards each other: nothing can touch its middle before it touches a face.
+    Hollow,
+    /// One face: the rim of an open surface.
+    Boundary,
+    /// More than two faces, or two of opposite orientation: it has no inside.
+    Unoriented,
+}
+
+/// An edge of the surface, shared by its faces.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Edge {
+    pub vertices: [u32; 2],
+    /// The two faces; the same one twice at a boundary.
+    pub triangles: [u32; 2],
+    /// Unit pseudo-normal: the mean of the two faces' normals; at a boundary, away from the face in its plane.
+    pub normal: [f32; 3],
+    /// Cosine of half the angle between the faces' normals: the edge's normal cone.
+    pub cone: f32,
+    pub kind: EdgeKind,
+}
+
+/// The outward direction of a vertex.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct VertexNormal {
+    /// Angle-weighted pseudo-normal, unit (Baerentzen and Aanaes 2005: its sign tells inside from outside).
+    pub normal: [f32; 3],
+    /// Cosine of the half-angle of the cone of the faces' normals around `normal`; [`VertexNormal::OPEN`] at a rim.
+    pub cone: f32,
+}
+
+impl VertexNormal {
+    /// Cone of a vertex on the rim of an open surface: every direction belongs to it.
+    pub const OPEN: f32 = -2.0;
+}
+
+/// Up to eight triangles as structure of arrays: a corner and the two edges from it, by axis and lane.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(crate) struct TriangleBlock {
+    pub corner: [[f64; LANES]; 3],
+    pub edge1: [[f64; LANES]; 3],
+    pub edge2: [[f64; LANES]; 3],
+}
+
+impl TriangleBlock {
+    pub(crate) const ZERO: Self = Self {
+        corner: [[0.0; LANES]; 3],
+        edge1: [[0.0; LANES]; 3],
+        edge2: [[0.0; LANES]; 3],
+    };
+}
+
+/// One leaf: a block of triangles with the vertices and edges that it owns (each belongs to one leaf).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Leaf {
+    pub min: [f32; 3],
+    pub max: [f32; 3],
+    /// Mean normal of the triangles, and between which heights along it they lie; zero where the normals cancel.
+    pub normal: [f32; 3],
+    pub low: f32,
+    pub high: f32,
+    pub first_triangle: u32,
+    pub first_vertex: u32,
+    pub first_edge: u32,
+    pub triangles: u8,
+    pub vertices: u8,
+    /// Edges that can touch in their middle (all but [`EdgeKind::Hollow`]); they come first.
+    pub ridges: u8,
+}
+
+impl Leaf {
+    /// The triangle in a lane of the leaf's block.
+    #[inline(always)]
+    pub(crate) fn triangle(&self, lane: usize) -> u32 {
+        self.first_triangle
+            + if lane < usize::from(self.triangles) {
+                lane as u32
+            } else {
+                0
+            }
+    }
+}
+
+/// Eight children with their boxes by axis and lane.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(crate) struct Node {
+    pub min: [[f32; LANES]; 3],
+    pub max: [[f32; LANES]; 3],
+    pub child: [u32; LANES],
+}
+
+/// A triangle mesh made ready for queries.
+///
+/// Vertices that coincide exactly are one. Any mesh is accepted: the sign of a depth is taken from the normal of the
+/// closest feature (face, edge or vertex, the last two with angle-weighted pseudo-normals), so that for a closed and
+/// consistently oriented surface it is exact; behind an open sheet counts as inside, and beyond the rim of an open sheet, or
+/// nearest to an edge that has more than two faces or two of opposite orientation, counts as outside.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    pub(crate) vertices: Vec<[f64; 3]>,
+    pub(crate) vertex_normals: Vec<VertexNormal>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    /// Edge opposite to nothing in particular: edge `k` of a triangle runs from its vertex `k` to vertex `k + 1`.
+    pub(crate) triangle_edges: Vec<[u32; 3]>,
+    pub(crate) edges: Vec<Edge>,
+    pub(crate) blocks: Vec<TriangleBlock>,
+    pub(crate) leaves: Vec<Leaf>,
+    /// The root is the first.
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) radius: f64,
+    /// Tells surfaces apart: a digest of the vertices and triangles.
+    pub(crate) identity: u64,
+}
+
+impl Surface {
+    /// Builds the query structure; not for the haptic thread (it allocates, and takes about a microsecond a triangle).
+    #[must_use]
+    pub fn build(mesh: &TriMesh) -> Self {
+        build::surface(mesh.vertices(), mesh.triangles())
+    }
+
+    /// Triangles in the structure: those of the mesh less the ones whose corners coincide.
+    #[must_use]
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Greatest distance of a vertex from the origin of the mesh frame, in metres.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Memory that the structure holds, in bytes.
+    #[must_use]
+    pub fn memory_bytes(&self) -> usize {
+        fn bytes<T>(list: &[T]) -> usize {
+            core::mem::size_of_val(list)
+        }
+        core::mem::size_of::<Self>()
+            + bytes(&self.vertices)
+            + bytes(&self.vertex_normals)
+            + bytes(&self.triangles)
+            + bytes(&self.triangle_edges)
+            + bytes(&self.edges)
+            + bytes(&self.blocks)
+            + bytes(&self.leaves)
+            + bytes(&self.nodes)
+    }
+}
