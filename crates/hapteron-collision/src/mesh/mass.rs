@@ -1,8 +1,13 @@
 //! Mass properties of a closed mesh, from exact integrals over the tetrahedra between its triangles and a point.
 
 use super::{MeshError, MeshProblem, TriMesh, check};
-use crate::vector::{Vec3, add, cross, dot, scale, sub};
+use crate::vector::{Vec3, add, cross, dot, norm, scale, sub};
 use nalgebra::{Matrix3, Vector3};
+
+/// A surface whose oriented areas add up to less than this share of its area is closed.
+const CLOSED: f64 = 1e-6;
+/// Least volume, as a share of the bounding box.
+const FLAT: f64 = 1e-9;
 
 /// Volume, centre of mass and inertia of a solid of uniform density.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,16 +20,19 @@ pub struct MassProperties {
     pub inertia_per_mass: Matrix3<f64>,
 }
 
-/// Mass properties of a closed, consistently oriented mesh.
+/// Mass properties of a closed, consistently oriented mesh. Cracks without width (where a corner of one face lies on an edge
+/// of another) do not matter.
 ///
 /// # Errors
 /// An open mesh, one whose faces point inward or not all the same way, or one without volume: such a body needs its mass properties given.
 pub fn mass_properties(mesh: &TriMesh) -> Result<MassProperties, MeshError> {
     let no_volume = |reason: String| MeshError::new("mesh", MeshProblem::NoVolume { reason });
     let report = check(mesh);
-    if !report.is_closed() {
+    // The oriented areas of a closed surface add up to nothing, and only then does the volume not depend on the origin.
+    let open = norm(oriented_area(mesh)) > CLOSED * report.area;
+    if open || report.inconsistent_edges > 0 {
         return Err(no_volume(format!(
-            "{} boundary edges, {} edges with more than two faces, {} with faces of opposite orientation",
+            "it is open or its faces do not agree about the outside: {} boundary edges, {} edges with more than two faces, {} between faces of opposite orientation",
             report.boundary_edges, report.non_manifold_edges, report.inconsistent_edges
         )));
     }
@@ -32,13 +40,20 @@ pub fn mass_properties(mesh: &TriMesh) -> Result<MassProperties, MeshError> {
     let [low, high] = mesh.bounds();
     let extent = sub(high, low);
     let box_volume = extent[0] * extent[1] * extent[2];
-    if properties.volume < 0.0 {
+    if properties.volume < -FLAT * box_volume {
         return Err(no_volume("its faces point inward; flip them".into()));
     }
-    if !(properties.volume > 1e-9 * box_volume && properties.volume.is_finite()) {
+    if !(properties.volume > FLAT * box_volume && properties.volume.is_finite()) {
         return Err(no_volume("it is flat".into()));
     }
     Ok(properties)
+}
+
+fn oriented_area(mesh: &TriMesh) -> Vec3 {
+    mesh.triangles().iter().fold([0.0; 3], |sum, t| {
+        let [a, b, c] = t.map(|v| mesh.vertices()[v as usize]);
+        add(sum, scale(cross(sub(b, a), sub(c, a)), 0.5))
+    })
 }
 
 /// The integrals, whatever the mesh; they have their meaning for a closed one.
