@@ -1,4 +1,5 @@
 //! Time of one step: `cargo bench -p hapteron-dynamics`.
+#![allow(clippy::unwrap_used)]
 
 #[path = "../tests/common/mod.rs"]
 mod common;

@@ -1,5 +1,6 @@
 //! Every Jacobian against automatic differentiation and against central differences: catches a wrong sign, lever or index
 //! in Eqs. 9 to 11, 13 to 20 and 22 to 29.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! Steps as a whole: the condensed system against the full one, analytic motions, invariances, faults.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 

@@ -29,13 +29,41 @@ const HANDLE_HALF_SIZES: [f64; 2] = [7.5, 5.0];
 /// Length over which the handle widens towards the wall, and by how much.
 const FLARE: (f64, f64) = (11.0, 0.3);
 
+/// A passage through a model, in its mesh frame, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Opening {
+    /// Middle of the passage.
+    pub centre: [f64; 3],
+    /// Unit direction in which something is put through.
+    pub axis: [f64; 3],
+    /// Free distance from the middle along x (across the handle) and along z (up and down).
+    pub half_sizes: [f64; 2],
+}
+
+/// The opening of the cup's handle. Its arms above and below are straight for
+/// |x - centre| up to 0.8 mm towards the grip and all the way to the wall on the other side.
+pub const OPENING: Opening = {
+    let wall = 44.5 + 2.5 * (OPENING_HEIGHT / HEIGHT) * (OPENING_HEIGHT / HEIGHT);
+    let grip = GRIP - HANDLE_HALF_SIZES[1];
+    Opening {
+        centre: [0.5e-3 * (wall + grip), 0.0, 1e-3 * OPENING_HEIGHT],
+        axis: [0.0, 1.0, 0.0],
+        half_sizes: [0.5e-3 * (grip - wall), 1e-3 * (ARM - HANDLE_HALF_SIZES[1])],
+    }
+};
+
 /// Generates the mug in metres: its axis along z, its foot on z = 0, its handle towards positive x.
 pub(crate) fn generate() -> Shape {
     let mut shape = Shape::default();
-    let rings: Vec<Vec<u32>> = profile().iter().map(|&[radius, z]| ring(&mut shape, radius, z, AROUND)).collect();
+    let rings: Vec<Vec<u32>> = profile()
+        .iter()
+        .map(|&[radius, z]| ring(&mut shape, radius, z, AROUND))
+        .collect();
     let windows = window_rows();
     for (row, pair) in rings.windows(2).enumerate() {
-        let cut = windows.iter().any(|&start| (start..start + WINDOW.1).contains(&row));
+        let cut = windows
+            .iter()
+            .any(|&start| (start..start + WINDOW.1).contains(&row));
         for k in 0..AROUND {
             let from_handle = (k + WINDOW.0) % AROUND;
             if cut && from_handle < 2 * WINDOW.0 {
@@ -66,16 +94,21 @@ fn outer_radius(z: f64) -> f64 {
 /// Rows (radius, height) from the foot up the outer wall, over the rim and down the inner wall.
 fn profile() -> Vec<[f64; 2]> {
     let mut rows = vec![[36.0, 1.2], [38.5, 0.0], [41.5, 0.4], [43.6, 2.6]];
-    for z in [7.0, 13.0, 19.0, 25.0, 31.0, 37.0, 43.0, 49.5, 56.0, 62.5, 69.0, 75.0, 81.0, 87.0, 93.0, 99.0, 104.5] {
+    for z in [
+        8.5, 16.5, 25.0, 31.0, 37.0, 43.0, 49.5, 56.0, 62.5, 69.0, 75.0, 81.0, 87.0, 93.0, 99.0, 104.5,
+    ] {
         rows.push([outer_radius(z), z]);
     }
     let rim = outer_radius(HEIGHT) - 0.5 * WALL;
     for degrees in [10.0, 50.0, 90.0, 130.0, 170.0] {
         let angle: f64 = degrees * core::f64::consts::PI / 180.0;
         let half = 0.5 * WALL;
-        rows.push([rim + half * libm::cos(angle), HEIGHT - half + half * libm::sin(angle)]);
+        rows.push([
+            rim + half * libm::cos(angle),
+            HEIGHT - half + half * libm::sin(angle),
+        ]);
     }
-    for z in [97.0, 84.0, 70.0, 55.0, 40.0, 25.0, 13.0] {
+    for z in [97.0, 80.0, 62.0, 44.0, 27.0, 13.0] {
         rows.push([outer_radius(z) - WALL, z]);
     }
     rows.extend([[37.8, 6.6], [33.0, 4.2]]);
@@ -86,7 +119,9 @@ fn profile() -> Vec<[f64; 2]> {
 fn window_rows() -> [usize; 2] {
     let rows = profile();
     [OPENING_HEIGHT - ARM, OPENING_HEIGHT + ARM].map(|middle| {
-        let row = rows.iter().position(|&[radius, z]| radius > 40.0 && (z - middle).abs() < 1e-9);
+        let row = rows
+            .iter()
+            .position(|&[radius, z]| radius > 40.0 && (z - middle).abs() < 1e-9);
         row.unwrap_or(WINDOW.1) - WINDOW.1 / 2
     })
 }
@@ -118,7 +153,12 @@ fn cap(shape: &mut Shape, outer: &[u32], side: f64) {
     let middle = if side < 0.0 { 1.6 } else { WALL };
     let mut previous = outer.to_vec();
     for (count, share) in [(24, 0.66), (12, 0.33)] {
-        let mut inner = ring(shape, start * share, middle + (height - middle) * share * share * share, count);
+        let mut inner = ring(
+            shape,
+            start * share,
+            middle + (height - middle) * share * share * share,
+            count,
+        );
         if side < 0.0 {
             inner = reversed_from_start(&inner);
         }
@@ -183,7 +223,11 @@ fn path_length(start: f64) -> f64 {
 fn path(start: f64, travelled: f64) -> (Point, Point) {
     let whole = path_length(start);
     // The line is symmetric about the height of the opening.
-    let (lower, sign) = if travelled > 0.5 * whole { (whole - travelled, 1.0) } else { (travelled, -1.0) };
+    let (lower, sign) = if travelled > 0.5 * whole {
+        (whole - travelled, 1.0)
+    } else {
+        (travelled, -1.0)
+    };
     let arm = GRIP - BEND - start;
     let quarter = 0.5 * core::f64::consts::PI * BEND;
     let (x, z, out_x, out_z) = if lower < arm {

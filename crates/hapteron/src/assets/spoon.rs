@@ -49,8 +49,9 @@ pub(crate) fn generate() -> Shape {
 
 /// Places of the 42 sections along the spoon: dense where the outline turns.
 fn stations() -> Vec<f64> {
-    let even =
-        |from: f64, to: f64, count: usize| (0..count).map(move |i| from + (to - from) * i as f64 / (count - 1) as f64);
+    let even = |from: f64, to: f64, count: usize| {
+        (0..count).map(move |i| from + (to - from) * i as f64 / (count - 1) as f64)
+    };
     let mut stations = vec![0.6, 2.0, 4.2, 7.2];
     stations.extend(even(10.8, 52.0, 12));
     stations.extend(even(55.0, 67.0, 5));
@@ -78,7 +79,11 @@ impl Section {
         let rounding = 1.3 * end;
         let to_end = ((x - (LENGTH - rounding)) / rounding).clamp(0.0, 1.0);
         let handle = (neck + (end - neck) * smooth_step((x - 70.0) / 120.0)) * (1.0 - to_end * to_end).sqrt();
-        let half_width = if x > half_length { smooth_maximum(bowl, handle, 3.5) } else { bowl };
+        let half_width = if x > half_length {
+            smooth_maximum(bowl, handle, 3.5)
+        } else {
+            bowl
+        };
         let handle_share = smooth_step((x - 40.0) / 50.0);
         let beyond = ((x - ARCH[1]) / (LENGTH - ARCH[1])).clamp(0.0, 1.0);
         Self {
@@ -95,7 +100,11 @@ impl Section {
         let quarter = AROUND / 4;
         let fold = (k % (2 * quarter)).min(2 * quarter - k % (2 * quarter));
         let magnitude = ACROSS[0][fold] + (ACROSS[1][fold] - ACROSS[0][fold]) * self.handle_share;
-        let across = if k > quarter && k < 3 * quarter { -magnitude } else { magnitude };
+        let across = if k > quarter && k < 3 * quarter {
+            -magnitude
+        } else {
+            magnitude
+        };
         let side = if k < 2 * quarter { 1.0 } else { -1.0 };
         let square = magnitude * magnitude;
         let half_thickness = 0.5 * self.thickness * libm::pow(1.0 - square * square, 0.45);
