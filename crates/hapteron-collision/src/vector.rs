@@ -25,11 +25,7 @@ pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
 
 #[inline(always)]
 pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[inline(always)]
@@ -41,11 +37,7 @@ pub(crate) fn norm(a: Vec3) -> f64 {
 #[inline(always)]
 pub(crate) fn unit_or_zero(a: Vec3) -> Vec3 {
     let length = norm(a);
-    if length > 0.0 && length.is_finite() {
-        scale(a, 1.0 / length)
-    } else {
-        [0.0; 3]
-    }
+    if length > 0.0 && length.is_finite() { scale(a, 1.0 / length) } else { [0.0; 3] }
 }
 
 /// A rigid motion as rows of numbers: `rotation * v + translation`.
@@ -60,19 +52,12 @@ impl Rigid {
         let r = isometry.rotation.to_rotation_matrix();
         let row = |i: usize| [r[(i, 0)], r[(i, 1)], r[(i, 2)]];
         let t = isometry.translation.vector;
-        Self {
-            rotation: [row(0), row(1), row(2)],
-            translation: [t.x, t.y, t.z],
-        }
+        Self { rotation: [row(0), row(1), row(2)], translation: [t.x, t.y, t.z] }
     }
 
     #[inline(always)]
     pub(crate) fn direction(&self, v: Vec3) -> Vec3 {
-        [
-            dot(self.rotation[0], v),
-            dot(self.rotation[1], v),
-            dot(self.rotation[2], v),
-        ]
+        [dot(self.rotation[0], v), dot(self.rotation[1], v), dot(self.rotation[2], v)]
     }
 
     #[inline(always)]

@@ -47,11 +47,7 @@ impl Hand {
     /// # Errors
     /// Mass and stiffness must be positive, damping not negative, all finite.
     pub fn new(parameters: HandParameters, goal: &DeviceSample) -> Result<Self, HandError> {
-        let HandParameters {
-            mass,
-            damping,
-            stiffness,
-        } = parameters;
+        let HandParameters { mass, damping, stiffness } = parameters;
         for (name, value, valid) in [
             ("mass", mass, mass > 0.0),
             ("damping", damping, damping >= 0.0),
@@ -61,10 +57,7 @@ impl Hand {
                 return Err(HandError(name, value));
             }
         }
-        Ok(Self {
-            parameters,
-            sample: *goal,
-        })
+        Ok(Self { parameters, sample: *goal })
     }
 
     /// Where the hand is.
@@ -77,11 +70,7 @@ impl Hand {
     ///
     /// Implicit Euler on each axis, stable for any impedance. The turn towards the goal is treated as small within one step. Real time: constant work.
     pub fn advance(&mut self, goal: &DeviceSample, command: &DeviceCommand, dt: f64) -> DeviceSample {
-        let HandParameters {
-            mass,
-            damping,
-            stiffness,
-        } = self.parameters;
+        let HandParameters { mass, damping, stiffness } = self.parameters;
         let whole = mass + dt * damping + dt * dt * stiffness;
         let pull = (goal.position - self.sample.position) * stiffness
             + goal.linear_velocity * damping
@@ -119,17 +108,11 @@ mod tests {
 
     #[test]
     fn a_pushed_hand_gives_way_by_force_over_stiffness() {
-        let parameters = HandParameters {
-            mass: 0.1,
-            damping: 5.0,
-            stiffness: 100.0,
-        };
+        let parameters = HandParameters { mass: 0.1, damping: 5.0, stiffness: 100.0 };
         let goal = at(Vector3::zeros());
         let mut hand = Hand::new(parameters, &goal).unwrap();
-        let command = DeviceCommand {
-            force: Vector3::new(0.0, 0.0, 2.0),
-            torque: Vector3::new(0.01, 0.0, 0.0),
-        };
+        let command =
+            DeviceCommand { force: Vector3::new(0.0, 0.0, 2.0), torque: Vector3::new(0.01, 0.0, 0.0) };
         for _ in 0..5000 {
             hand.advance(&goal, &command, 1e-3);
         }
@@ -140,38 +123,21 @@ mod tests {
 
     #[test]
     fn a_force_that_is_not_finite_does_not_move_the_hand() {
-        let parameters = HandParameters {
-            mass: 0.1,
-            damping: 5.0,
-            stiffness: 100.0,
-        };
+        let parameters = HandParameters { mass: 0.1, damping: 5.0, stiffness: 100.0 };
         let goal = at(Vector3::x());
         let mut hand = Hand::new(parameters, &goal).unwrap();
-        let command = DeviceCommand {
-            force: Vector3::new(f64::NAN, 0.0, 0.0),
-            torque: Vector3::zeros(),
-        };
+        let command = DeviceCommand { force: Vector3::new(f64::NAN, 0.0, 0.0), torque: Vector3::zeros() };
         assert_eq!(hand.advance(&goal, &command, 1e-3).position, Vector3::x());
     }
 
     #[test]
     fn impedance_must_be_physical() {
         let goal = at(Vector3::zeros());
-        let good = HandParameters {
-            mass: 0.1,
-            damping: 5.0,
-            stiffness: 100.0,
-        };
+        let good = HandParameters { mass: 0.1, damping: 5.0, stiffness: 100.0 };
         for bad in [
             HandParameters { mass: 0.0, ..good },
-            HandParameters {
-                damping: -1.0,
-                ..good
-            },
-            HandParameters {
-                stiffness: f64::NAN,
-                ..good
-            },
+            HandParameters { damping: -1.0, ..good },
+            HandParameters { stiffness: f64::NAN, ..good },
         ] {
             assert!(Hand::new(bad, &goal).is_err());
         }

@@ -39,9 +39,6 @@ impl DeviceCommand {
     /// Nothing.
     #[must_use]
     pub fn zero() -> Self {
-        Self {
-            force: Vector3::zeros(),
-            torque: Vector3::zeros(),
-        }
+        Self { force: Vector3::zeros(), torque: Vector3::zeros() }
     }
 }

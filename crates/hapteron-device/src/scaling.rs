@@ -51,10 +51,7 @@ impl Scaling {
     #[must_use]
     pub fn to_device(&self, command: &DeviceCommand) -> DeviceCommand {
         let s = self.position_scale;
-        DeviceCommand {
-            force: command.force / s,
-            torque: command.torque / (s * s),
-        }
+        DeviceCommand { force: command.force / s, torque: command.torque / (s * s) }
     }
 }
 
@@ -73,10 +70,8 @@ mod tests {
             linear_velocity: Vector3::new(1.0, 2.0, 3.0),
             angular_velocity: Vector3::new(-1.0, 0.5, 2.0),
         };
-        let command = DeviceCommand {
-            force: Vector3::new(3.0, -1.0, 2.0),
-            torque: Vector3::new(0.1, 0.3, 0.2),
-        };
+        let command =
+            DeviceCommand { force: Vector3::new(3.0, -1.0, 2.0), torque: Vector3::new(0.1, 0.3, 0.2) };
         let (world, device) = (scaling.to_world(&sample), scaling.to_device(&command));
         assert_eq!(device.force, command.force / 0.4);
         let force = device.force.dot(&sample.linear_velocity) / command.force.dot(&world.linear_velocity);

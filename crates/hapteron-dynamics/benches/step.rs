@@ -33,13 +33,7 @@ impl Case {
         let handle = random.handle(&state);
         let coupling = random.coupling(false);
         let planes = (0..planes).map(|_| random.plane(&state)).collect();
-        Self {
-            body,
-            state,
-            handle,
-            coupling,
-            planes,
-        }
+        Self { body, state, handle, coupling, planes }
     }
 
     fn problem(&self) -> Problem<'_> {

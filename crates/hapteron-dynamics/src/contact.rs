@@ -46,14 +46,7 @@ impl ContactPlane {
         damping: f64,
         tolerance: f64,
     ) -> Self {
-        Self {
-            point_b,
-            normal_w,
-            offset: normal_w.dot(point_w),
-            stiffness,
-            damping,
-            tolerance,
-        }
+        Self { point_b, normal_w, offset: normal_w.dot(point_w), stiffness, damping, tolerance }
     }
 
     #[inline]
@@ -84,12 +77,7 @@ impl ContactPlane {
     ) -> Wrench<T> {
         let r = rotation(&state.orientation);
         let omega = angular_velocity(&state.orientation, &state.angular_momentum, inverse_inertia_b);
-        let reach = self.reach(
-            &state.position,
-            &r,
-            &(state.linear_momentum * inverse_mass),
-            &omega,
-        );
+        let reach = self.reach(&state.position, &r, &(state.linear_momentum * inverse_mass), &omega);
         if clamp && (reach.gap <= T::zero() || reach.push <= T::zero()) {
             return Wrench::zero();
         }
@@ -108,14 +96,7 @@ impl ContactPlane {
         // d(fn) = k J.(dx, dtheta) + b J.(dv, domega) + b (a x (n x omega)).dtheta
         let swing = a.cross(&n.cross(omega)) * b;
         let kj = j * k;
-        let row = Vector6::new(
-            kj[0],
-            kj[1],
-            kj[2],
-            kj[3] + swing.x,
-            kj[4] + swing.y,
-            kj[5] + swing.z,
-        );
+        let row = Vector6::new(kj[0], kj[1], kj[2], kj[3] + swing.x, kj[4] + swing.y, kj[5] + swing.z);
         to.by_position -= j * row.transpose();
         to.by_velocity -= j * (j * b).transpose();
         // The lever turns with the body: (dtheta x a) x (-fn n).
@@ -162,9 +143,7 @@ pub(crate) fn add_planes(
         if gap > 0.0 && push > 0.0 {
             plane.add(&reach, &motion.omega, to);
             // Order-dependent, so that different sets of planes have different signatures.
-            signature = signature
-                .wrapping_mul(0x0000_0100_0000_01b3)
-                .wrapping_add(index as u64 + 1);
+            signature = signature.wrapping_mul(0x0000_0100_0000_01b3).wrapping_add(index as u64 + 1);
         }
     }
     signature
@@ -200,11 +179,7 @@ impl LinearizedContact {
         let motion = Motion::of(state, body);
         let mut sum = Linearization::zero();
         add_planes(planes, state, &motion, None, &mut sum);
-        Self {
-            wrench: sum.wrench,
-            jacobian: sum.by_state(&motion),
-            state: *state,
-        }
+        Self { wrench: sum.wrench, jacobian: sum.by_state(&motion), state: *state }
     }
 
     /// The wrench at another state.  Eq. 30.

@@ -108,10 +108,7 @@ fn spring<T: RealField + Copy>(spring: &Spring, deflection: &Vector3<T>) -> (Vec
     }
     // With a bend of 2 the cubic is a parabola: the slope falls from k to 0 in a straight line.
     let force = half + k * length * t * (T::one() - t * constant(0.5));
-    (
-        deflection * (force / s),
-        (T::one() - t).max(constant(LEAST_DAMPING)),
-    )
+    (deflection * (force / s), (T::one() - t).max(constant(LEAST_DAMPING)))
 }
 
 impl Coupling {
@@ -146,14 +143,7 @@ impl Coupling {
         if let Some(&value) = grasp_position_b.iter().find(|c| !c.is_finite()) {
             return Err(CouplingError::Limit("grasp_position", value));
         }
-        Ok(Self {
-            linear,
-            angular,
-            linear_damping,
-            angular_damping,
-            grasp_position_b,
-            grasp_orientation_b,
-        })
+        Ok(Self { linear, angular, linear_damping, angular_damping, grasp_position_b, grasp_orientation_b })
     }
 
     /// k_c, N/m.
@@ -178,10 +168,7 @@ impl Coupling {
         let constant = |v: &Vector3<f64>| v.map(convert::<f64, T>);
         let arm = rotation(&state.orientation) * constant(&self.grasp_position_b);
         let to4 = |q: &UnitQuaternion<f64>| Vector4::new(q.w, q.i, q.j, q.k);
-        let goal = product(
-            &to4(&handle.orientation),
-            &conjugate(&to4(&self.grasp_orientation_b)),
-        );
+        let goal = product(&to4(&handle.orientation), &conjugate(&to4(&self.grasp_orientation_b)));
         let error = product(&goal.map(convert::<f64, T>), &conjugate(&state.orientation));
         Deviation {
             arm,
@@ -216,10 +203,7 @@ impl Coupling {
         let deviation = self.deviation(handle, state, &v, &omega);
         let (force, torque) = self.link(&deviation);
         let at_center = Wrench::at(&deviation.arm, force);
-        Wrench {
-            torque: at_center.torque + torque,
-            ..at_center
-        }
+        Wrench { torque: at_center.torque + torque, ..at_center }
     }
 
     /// What a device is sent: the opposite of the coupling's force, and of its torque without the lever of the force,
@@ -230,14 +214,7 @@ impl Coupling {
         let deviation = self.deviation(handle, state, &v, &state.angular_velocity(body));
         let (force, torque) = self.link(&deviation);
         let length = |v: &Vector3<f64>| libm::sqrt(v.norm_squared());
-        (
-            Wrench {
-                force: -force,
-                torque: -torque,
-            },
-            length(&deviation.offset),
-            length(&deviation.turn),
-        )
+        (Wrench { force: -force, torque: -torque }, length(&deviation.offset), length(&deviation.turn))
     }
 
     /// Brings a wrench to the greatest force and torque, keeping directions; tells whether it had to.
@@ -268,13 +245,7 @@ impl Coupling {
         to: &mut Linearization,
     ) {
         let deviation = self.deviation(handle, state, v, omega);
-        let Deviation {
-            arm,
-            offset,
-            rate,
-            turn,
-            turn_rate,
-        } = deviation;
+        let Deviation { arm, offset, rate, turn, turn_rate } = deviation;
         let (pull, k, b, b_by_offset) = tangent(&self.linear, self.linear_damping, &offset);
         let (twist, k_turn, b_turn, b_by_turn) = tangent(&self.angular, self.angular_damping, &turn);
         let force = pull + rate * b;
@@ -291,11 +262,7 @@ impl Coupling {
         let torque = arm.cross(&force) + twist + turn_rate * b_turn;
         to.wrench += Wrench { force, torque }.to_vector();
         let mut add = |row: usize, column: usize, m: Matrix3<f64>, velocity: bool| {
-            let block = if velocity {
-                &mut to.by_velocity
-            } else {
-                &mut to.by_position
-            };
+            let block = if velocity { &mut to.by_velocity } else { &mut to.by_position };
             let mut part = block.fixed_view_mut::<3, 3>(row, column);
             part += m;
         };
@@ -326,10 +293,6 @@ fn tangent(
     let uu = u * u.transpose();
     let derivative = uu * at.slope + (Matrix3::identity() - uu) * (at.force / s);
     let share = at.slope / k;
-    let (share, by_s) = if share > LEAST_DAMPING {
-        (share, at.curvature / k)
-    } else {
-        (LEAST_DAMPING, 0.0)
-    };
+    let (share, by_s) = if share > LEAST_DAMPING { (share, at.curvature / k) } else { (LEAST_DAMPING, 0.0) };
     (u * at.force, derivative, damping * share, u * (damping * by_s))
 }

@@ -27,11 +27,7 @@ impl Linearization {
     /// No force.
     #[must_use]
     pub fn zero() -> Self {
-        Self {
-            wrench: Vector6::zeros(),
-            by_position: Matrix6::zeros(),
-            by_velocity: Matrix6::zeros(),
-        }
+        Self { wrench: Vector6::zeros(), by_position: Matrix6::zeros(), by_velocity: Matrix6::zeros() }
     }
 
     /// The Jacobian by the state: the blocks of Eqs. 13 to 20 and 22 to 29.
@@ -40,14 +36,11 @@ impl Linearization {
         let mut j = StateJacobian::zeros();
         let by_omega = self.by_velocity.fixed_columns::<3>(3);
         let by_turn = self.by_position.fixed_columns::<3>(3) + by_omega * motion.omega_by_turn;
-        j.fixed_columns_mut::<3>(0)
-            .copy_from(&self.by_position.fixed_columns::<3>(0));
-        j.fixed_columns_mut::<4>(3)
-            .copy_from(&(by_turn * motion.turn_by_q));
+        j.fixed_columns_mut::<3>(0).copy_from(&self.by_position.fixed_columns::<3>(0));
+        j.fixed_columns_mut::<4>(3).copy_from(&(by_turn * motion.turn_by_q));
         j.fixed_columns_mut::<3>(7)
             .copy_from(&(self.by_velocity.fixed_columns::<3>(0) * motion.inverse_mass));
-        j.fixed_columns_mut::<3>(10)
-            .copy_from(&(by_omega * motion.inverse_inertia_w));
+        j.fixed_columns_mut::<3>(10).copy_from(&(by_omega * motion.inverse_inertia_w));
         j
     }
 }

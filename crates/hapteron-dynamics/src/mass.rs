@@ -22,10 +22,7 @@ impl core::fmt::Display for RigidBodyError {
             Self::Mass(mass) => write!(f, "mass {mass} kg; it must be positive and finite"),
             Self::Asymmetric => write!(f, "the inertia matrix is not symmetric and finite"),
             Self::NotPositive(least) => {
-                write!(
-                    f,
-                    "the inertia has the principal moment {least} kg m^2; all three must be positive"
-                )
+                write!(f, "the inertia has the principal moment {least} kg m^2; all three must be positive")
             }
             Self::Triangle => {
                 write!(
@@ -68,14 +65,8 @@ impl RigidBody {
         if moments[2] > (moments[0] + moments[1]) * 1.001 {
             return Err(RigidBodyError::Triangle);
         }
-        let inverse_inertia_b = inertia_b
-            .try_inverse()
-            .ok_or(RigidBodyError::NotPositive(moments[0]))?;
-        Ok(Self {
-            mass,
-            inertia_b,
-            inverse_inertia_b,
-        })
+        let inverse_inertia_b = inertia_b.try_inverse().ok_or(RigidBodyError::NotPositive(moments[0]))?;
+        Ok(Self { mass, inertia_b, inverse_inertia_b })
     }
 
     /// m, in kg.

@@ -132,11 +132,7 @@ pub(crate) fn rotation_vector<T: RealField + Copy>(e: &Vector4<T>) -> Vector3<T>
 pub(crate) fn exponential(turn: &Vector3<f64>) -> Vector4<f64> {
     let angle = libm::sqrt(turn.norm_squared());
     let half = 0.5 * angle;
-    let scale = if angle > 1e-8 {
-        libm::sin(half) / angle
-    } else {
-        0.5
-    };
+    let scale = if angle > 1e-8 { libm::sin(half) / angle } else { 0.5 };
     Vector4::new(libm::cos(half), turn.x * scale, turn.y * scale, turn.z * scale)
 }
 

@@ -34,11 +34,7 @@ impl Spring {
     #[must_use]
     pub fn at(&self, s: f64) -> SpringForce {
         let k = self.stiffness;
-        let linear = SpringForce {
-            force: k * s,
-            slope: k,
-            curvature: 0.0,
-        };
+        let linear = SpringForce { force: k * s, slope: k, curvature: 0.0 };
         let Some(limit) = self.limit else { return linear };
         let start = LINEAR * limit / k;
         // Also true for a stiffness of zero, whose start is infinite or not a number.
@@ -49,11 +45,7 @@ impl Spring {
         let length = BEND * rise / k;
         let t = (s - start) / length;
         if t >= 1.0 {
-            return SpringForce {
-                force: limit,
-                slope: 0.0,
-                curvature: 0.0,
-            };
+            return SpringForce { force: limit, slope: 0.0, curvature: 0.0 };
         }
         let (t2, t3) = (t * t, t * t * t);
         SpringForce {

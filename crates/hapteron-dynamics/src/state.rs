@@ -52,11 +52,7 @@ impl State<f64> {
     /// omega, world axes, rad/s.  Eq. 3.
     #[must_use]
     pub fn angular_velocity(&self, body: &RigidBody) -> Vector3<f64> {
-        angular_velocity(
-            &self.orientation,
-            &self.angular_momentum,
-            body.inverse_inertia_b(),
-        )
+        angular_velocity(&self.orientation, &self.angular_momentum, body.inverse_inertia_b())
     }
 
     /// Whether every component is a finite number.

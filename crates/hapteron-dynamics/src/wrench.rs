@@ -15,10 +15,7 @@ impl<T: RealField + Copy> Wrench<T> {
     /// No force, no torque.
     #[must_use]
     pub fn zero() -> Self {
-        Self {
-            force: Vector3::zeros(),
-            torque: Vector3::zeros(),
-        }
+        Self { force: Vector3::zeros(), torque: Vector3::zeros() }
     }
 
     /// Force over torque.
@@ -31,19 +28,13 @@ impl<T: RealField + Copy> Wrench<T> {
     /// From force over torque.
     #[must_use]
     pub fn from_vector(v: &Vector6<T>) -> Self {
-        Self {
-            force: Vector3::new(v[0], v[1], v[2]),
-            torque: Vector3::new(v[3], v[4], v[5]),
-        }
+        Self { force: Vector3::new(v[0], v[1], v[2]), torque: Vector3::new(v[3], v[4], v[5]) }
     }
 
     /// The force with its torque about the origin when it acts at `arm`.
     #[must_use]
     pub fn at(arm: &Vector3<T>, force: Vector3<T>) -> Self {
-        Self {
-            force,
-            torque: arm.cross(&force),
-        }
+        Self { force, torque: arm.cross(&force) }
     }
 }
 
@@ -58,19 +49,13 @@ impl Wrench<f64> {
 impl<T: RealField + Copy> core::ops::Add for Wrench<T> {
     type Output = Self;
     fn add(self, other: Self) -> Self {
-        Self {
-            force: self.force + other.force,
-            torque: self.torque + other.torque,
-        }
+        Self { force: self.force + other.force, torque: self.torque + other.torque }
     }
 }
 
 impl<T: RealField + Copy> core::ops::Neg for Wrench<T> {
     type Output = Self;
     fn neg(self) -> Self {
-        Self {
-            force: -self.force,
-            torque: -self.torque,
-        }
+        Self { force: -self.force, torque: -self.torque }
     }
 }

@@ -24,10 +24,7 @@ fn automatic<const N: usize>(
     state: &State,
     f: impl Fn(&State<Dual>) -> SVector<Dual, N>,
 ) -> SMatrix<f64, N, 13> {
-    let (_, j) = num_dual::jacobian(
-        |y: SVector<Dual, 13>| f(&State::from_vector(&y)),
-        &state.to_vector(),
-    );
+    let (_, j) = num_dual::jacobian(|y: SVector<Dual, 13>| f(&State::from_vector(&y)), &state.to_vector());
     j
 }
 
@@ -87,9 +84,8 @@ fn rotation_and_its_rate_have_the_derivatives_of_eqs_8_to_11() {
         let inverse = dual_matrix(body.inverse_inertia_b());
         let motion = Motion::of(&state, &body);
 
-        let by_rotation = automatic::<9>(&state, |s| {
-            SVector::from_iterator(rotation(&s.orientation).iter().copied())
-        });
+        let by_rotation =
+            automatic::<9>(&state, |s| SVector::from_iterator(rotation(&s.orientation).iter().copied()));
         for i in 0..4 {
             let expected = Matrix3::from_iterator(by_rotation.column(3 + i).iter().copied());
             assert!((rotation_derivative(&state.orientation, i) - expected).norm() < 1e-13);
@@ -97,20 +93,11 @@ fn rotation_and_its_rate_have_the_derivatives_of_eqs_8_to_11() {
 
         let spin = |s: &State<Dual>| angular_velocity(&s.orientation, &s.angular_momentum, &inverse);
         let mut omega = SMatrix::<f64, 3, 13>::zeros();
-        omega
-            .fixed_columns_mut::<4>(3)
-            .copy_from(&(motion.omega_by_turn * motion.turn_by_q));
-        omega
-            .fixed_columns_mut::<3>(10)
-            .copy_from(&motion.inverse_inertia_w);
+        omega.fixed_columns_mut::<4>(3).copy_from(&(motion.omega_by_turn * motion.turn_by_q));
+        omega.fixed_columns_mut::<3>(10).copy_from(&motion.inverse_inertia_w);
         let spin_f64 =
             |s: &State| angular_velocity(&s.orientation, &s.angular_momentum, body.inverse_inertia_b());
-        judge(
-            "Eq. 11",
-            &omega,
-            &automatic(&state, spin),
-            &differences(&state, &body, spin_f64),
-        );
+        judge("Eq. 11", &omega, &automatic(&state, spin), &differences(&state, &body, spin_f64));
 
         let rate = |s: &State<Dual>| -> Vector4<Dual> { quaternion_rate_matrix(&s.orientation) * spin(s) };
         let rate_f64 = |s: &State| -> Vector4<f64> { quaternion_rate_matrix(&s.orientation) * spin_f64(s) };
@@ -119,12 +106,7 @@ fn rotation_and_its_rate_have_the_derivatives_of_eqs_8_to_11() {
         by_state.fixed_columns_mut::<4>(3).copy_from(&by_q);
         let by_l = quaternion_rate_matrix(&state.orientation) * motion.inverse_inertia_w;
         by_state.fixed_columns_mut::<3>(10).copy_from(&by_l);
-        judge(
-            "Eqs. 9, 10",
-            &by_state,
-            &automatic(&state, rate),
-            &differences(&state, &body, rate_f64),
-        );
+        judge("Eqs. 9, 10", &by_state, &automatic(&state, rate), &differences(&state, &body, rate_f64));
     }
 }
 
@@ -141,14 +123,9 @@ fn coupling_has_the_derivatives_of_eqs_13_to_20() {
         coupling.linearize(&handle, &state, &motion.v, &motion.omega, &mut sum);
         let inverse = dual_matrix(body.inverse_inertia_b());
         let mass = Dual::from(body.mass()).recip();
-        let exact = automatic(&state, |s| {
-            coupling.wrench(&handle, s, mass, &inverse).to_vector()
-        });
-        let value = |s: &State| {
-            coupling
-                .wrench(&handle, s, 1.0 / body.mass(), body.inverse_inertia_b())
-                .to_vector()
-        };
+        let exact = automatic(&state, |s| coupling.wrench(&handle, s, mass, &inverse).to_vector());
+        let value =
+            |s: &State| coupling.wrench(&handle, s, 1.0 / body.mass(), body.inverse_inertia_b()).to_vector();
         let finite = differences(&state, &body, value);
         assert!((sum.wrench - value(&state)).norm() < 1e-11 * (1.0 + value(&state).norm()));
         judge("coupling", &sum.by_state(&motion), &exact, &finite);
@@ -171,11 +148,8 @@ fn contact_plane_has_the_derivatives_of_eqs_22_to_29() {
         let inverse = dual_matrix(body.inverse_inertia_b());
         let mass = Dual::from(body.mass()).recip();
         let exact = automatic(&state, |s| plane.wrench(s, mass, &inverse, false).to_vector());
-        let value = |s: &State| {
-            plane
-                .wrench(s, 1.0 / body.mass(), body.inverse_inertia_b(), false)
-                .to_vector()
-        };
+        let value =
+            |s: &State| plane.wrench(s, 1.0 / body.mass(), body.inverse_inertia_b(), false).to_vector();
         let finite = differences(&state, &body, value);
         assert!((model.wrench - value(&state)).norm() < 1e-11 * (1.0 + value(&state).norm()));
         judge("contact", &model.jacobian, &exact, &finite);
@@ -196,22 +170,15 @@ fn eq_30_is_tangent_to_the_planes_in_either_hemisphere() {
         let predicted = model.wrench_at(&near);
         near.orientation = -near.orientation;
         let flipped = model.wrench_at(&near);
-        assert!(
-            (predicted - flipped).norm() <= 1e-9 * predicted.norm(),
-            "hemispheres were mixed"
-        );
+        assert!((predicted - flipped).norm() <= 1e-9 * predicted.norm(), "hemispheres were mixed");
         let pushing = |s: &State| {
             planes
                 .iter()
                 .filter(|p| {
-                    p.wrench(&state, 1.0 / body.mass(), body.inverse_inertia_b(), true)
-                        .force
+                    p.wrench(&state, 1.0 / body.mass(), body.inverse_inertia_b(), true).force
                         != Vector3::zeros()
                 })
-                .map(|p| {
-                    p.wrench(s, 1.0 / body.mass(), body.inverse_inertia_b(), false)
-                        .to_vector()
-                })
+                .map(|p| p.wrench(s, 1.0 / body.mass(), body.inverse_inertia_b(), false).to_vector())
                 .sum::<nalgebra::Vector6<f64>>()
         };
         near.orientation = -near.orientation;

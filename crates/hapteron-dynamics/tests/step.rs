@@ -28,19 +28,8 @@ fn still_handle() -> Handle {
 }
 
 fn coupling(k: f64, b: f64, k_turn: f64, b_turn: f64) -> Coupling {
-    let spring = |stiffness| Spring {
-        stiffness,
-        limit: None,
-    };
-    Coupling::new(
-        spring(k),
-        b,
-        spring(k_turn),
-        b_turn,
-        Vector3::zeros(),
-        UnitQuaternion::identity(),
-    )
-    .unwrap()
+    let spring = |stiffness| Spring { stiffness, limit: None };
+    Coupling::new(spring(k), b, spring(k_turn), b_turn, Vector3::zeros(), UnitQuaternion::identity()).unwrap()
 }
 
 fn ball(mass: f64) -> RigidBody {
@@ -48,13 +37,7 @@ fn ball(mass: f64) -> RigidBody {
 }
 
 fn problem<'a>(body: &'a RigidBody, coupling: &'a Coupling, handle: &'a Handle) -> Problem<'a> {
-    Problem {
-        body,
-        coupling,
-        handle,
-        contact: ContactForce::None,
-        gravity: Vector3::zeros(),
-    }
+    Problem { body, coupling, handle, contact: ContactForce::None, gravity: Vector3::zeros() }
 }
 
 #[test]
@@ -67,10 +50,8 @@ fn condensed_and_full_system_agree() {
         let handle = random.handle(&state);
         let coupling = random.coupling(false);
         let planes: [ContactPlane; 4] = std::array::from_fn(|_| random.plane(&state));
-        let problem = Problem {
-            contact: ContactForce::Planes(&planes),
-            ..problem(&body, &coupling, &handle)
-        };
+        let problem =
+            Problem { contact: ContactForce::Planes(&planes), ..problem(&body, &coupling, &handle) };
         let condensed = condensed_solve(&problem, &state, 1e-3).unwrap();
         let dense = dense_solve(&problem, &state, 1e-3).unwrap();
         for (start, count) in [(0, 3), (3, 4), (7, 3), (10, 3)] {
@@ -99,11 +80,7 @@ fn backward_euler_follows_its_closed_form_on_an_oscillator() {
         state = step(&problem, &state, dt, Method::BackwardEuler).state;
         v = (v - dt * k / mass * x) / (1.0 + dt * b / mass + dt * dt * k / mass);
         x += dt * v;
-        assert!(
-            (state.position.x - x).abs() < 1e-13,
-            "{} against {x}",
-            state.position.x
-        );
+        assert!((state.position.x - x).abs() < 1e-13, "{} against {x}", state.position.x);
     }
 }
 
@@ -111,24 +88,11 @@ fn backward_euler_follows_its_closed_form_on_an_oscillator() {
 fn two_springs_come_to_rest_where_their_forces_balance() {
     let (k, wall) = (200.0, 2000.0);
     let (body, coupling) = (ball(0.01), coupling(k, 1.0, 0.6, 0.01));
-    let handle = Handle {
-        position: Vector3::new(0.0, 0.0, -0.01),
-        ..still_handle()
-    };
+    let handle = Handle { position: Vector3::new(0.0, 0.0, -0.01), ..still_handle() };
     let tolerance = 5e-4;
-    let plane = [ContactPlane::new(
-        Vector3::zeros(),
-        &Vector3::zeros(),
-        -Vector3::z(),
-        wall,
-        3.0,
-        tolerance,
-    )];
+    let plane = [ContactPlane::new(Vector3::zeros(), &Vector3::zeros(), -Vector3::z(), wall, 3.0, tolerance)];
     for method in METHODS {
-        let problem = Problem {
-            contact: ContactForce::Planes(&plane),
-            ..problem(&body, &coupling, &handle)
-        };
+        let problem = Problem { contact: ContactForce::Planes(&plane), ..problem(&body, &coupling, &handle) };
         let mut state = State::moving(
             &body,
             Vector3::zeros(),
@@ -143,16 +107,9 @@ fn two_springs_come_to_rest_where_their_forces_balance() {
         }
         // k (0.01 - s) = wall (s + d)
         let sink = (k * 0.01 - wall * tolerance) / (k + wall);
-        assert!(
-            (-state.position.z - sink).abs() < 1e-9,
-            "{method:?}: {} against {sink}",
-            -state.position.z
-        );
+        assert!((-state.position.z - sink).abs() < 1e-9, "{method:?}: {} against {sink}", -state.position.z);
         assert!((last.contact.force.z - wall * (sink + tolerance)).abs() < 1e-6);
-        assert!(
-            (last.feedback.force.z - last.contact.force.z).abs() < 1e-6,
-            "the hand feels the wall"
-        );
+        assert!((last.feedback.force.z - last.contact.force.z).abs() < 1e-6, "the hand feels the wall");
     }
 }
 
@@ -160,11 +117,8 @@ fn two_springs_come_to_rest_where_their_forces_balance() {
 #[test]
 fn free_top_precesses_at_the_analytic_rate() {
     let (transverse, axial) = (2e-5, 3e-5);
-    let body = RigidBody::new(
-        0.1,
-        Matrix3::from_diagonal(&Vector3::new(transverse, transverse, axial)),
-    )
-    .unwrap();
+    let body =
+        RigidBody::new(0.1, Matrix3::from_diagonal(&Vector3::new(transverse, transverse, axial))).unwrap();
     let (coupling, handle) = (coupling(0.0, 0.0, 0.0, 0.0), still_handle());
     let problem = problem(&body, &coupling, &handle);
     let mut state = State::moving(
@@ -201,16 +155,12 @@ fn all_methods_converge_to_runge_kutta_with_tiny_steps() {
             &random.vector(0.1),
             &random.vector(5.0),
         );
-        let handle = Handle {
-            orientation: random.turn(0.5) * start.unit_quaternion(),
-            ..random.handle(&start)
-        };
+        let handle =
+            Handle { orientation: random.turn(0.5) * start.unit_quaternion(), ..random.handle(&start) };
         let problem = problem(&body, &coupling, &handle);
         let run = |method, dt: f64| {
             let steps = (0.02 / dt).round() as usize;
-            (0..steps)
-                .fold(start, |s, _| step(&problem, &s, dt, method).state)
-                .to_vector()
+            (0..steps).fold(start, |s, _| step(&problem, &s, dt, method).state).to_vector()
         };
         let exact = run(Method::RungeKutta4, 1e-5);
         for (method, order) in [
@@ -219,16 +169,10 @@ fn all_methods_converge_to_runge_kutta_with_tiny_steps() {
             (Method::ForwardEuler, 1),
             (Method::RungeKutta4, 4),
         ] {
-            let (coarse, fine) = (
-                (run(method, 4e-4) - exact).norm(),
-                (run(method, 2e-4) - exact).norm(),
-            );
+            let (coarse, fine) = ((run(method, 4e-4) - exact).norm(), (run(method, 2e-4) - exact).norm());
             let ratio = coarse / fine;
             let expected = f64::from(1 << order);
-            assert!(
-                ratio > 0.8 * expected && ratio < 1.4 * expected,
-                "{method:?}: {coarse:e} to {fine:e}"
-            );
+            assert!(ratio > 0.8 * expected && ratio < 1.4 * expected, "{method:?}: {coarse:e} to {fine:e}");
         }
     }
 }
@@ -257,34 +201,20 @@ fn moving_the_world_moves_the_result() {
             angular_velocity: turn * handle.angular_velocity,
         };
         let normal = turn * plane.normal_w;
-        let moved_plane = ContactPlane {
-            normal_w: normal,
-            offset: plane.offset + normal.dot(&shift),
-            ..plane
-        };
+        let moved_plane =
+            ContactPlane { normal_w: normal, offset: plane.offset + normal.dot(&shift), ..plane };
         for method in METHODS {
-            let one = Problem {
-                contact: ContactForce::Planes(&[plane]),
-                ..problem(&body, &coupling, &handle)
-            };
+            let one =
+                Problem { contact: ContactForce::Planes(&[plane]), ..problem(&body, &coupling, &handle) };
             let other = Problem {
                 contact: ContactForce::Planes(&[moved_plane]),
                 ..problem(&body, &coupling, &moved_handle)
             };
-            let (a, b) = (
-                step(&one, &state, 1e-4, method),
-                step(&other, &moved_state, 1e-4, method),
-            );
+            let (a, b) = (step(&one, &state, 1e-4, method), step(&other, &moved_state, 1e-4, method));
             let there = turn * a.state.position + shift;
-            assert!(
-                (there - b.state.position).norm() < 1e-8 * (1.0 + there.norm()),
-                "{method:?}"
-            );
+            assert!((there - b.state.position).norm() < 1e-8 * (1.0 + there.norm()), "{method:?}");
             let force = turn * a.feedback.force;
-            assert!(
-                (force - b.feedback.force).norm() < 1e-5 * (1.0 + force.norm()),
-                "{method:?}"
-            );
+            assert!((force - b.feedback.force).norm() < 1e-5 * (1.0 + force.norm()), "{method:?}");
         }
     }
 }
@@ -298,20 +228,15 @@ fn quaternion_and_its_opposite_are_the_same_orientation() {
         let handle = random.handle(&state);
         let coupling = random.coupling(false);
         let planes = [random.plane(&state)];
-        let problem = Problem {
-            contact: ContactForce::Planes(&planes),
-            ..problem(&body, &coupling, &handle)
-        };
+        let problem =
+            Problem { contact: ContactForce::Planes(&planes), ..problem(&body, &coupling, &handle) };
         let mut opposite = state;
         opposite.orientation = -opposite.orientation;
         let (a, b) = (
             step(&problem, &state, 1e-3, Method::BackwardEuler),
             step(&problem, &opposite, 1e-3, Method::BackwardEuler),
         );
-        assert!(
-            (a.state.orientation + b.state.orientation).norm() < 1e-12,
-            "the hemisphere is kept"
-        );
+        assert!((a.state.orientation + b.state.orientation).norm() < 1e-12, "the hemisphere is kept");
         assert!((a.feedback.force - b.feedback.force).norm() < 1e-9 * (1.0 + a.feedback.force.norm()));
     }
 }
@@ -362,11 +287,7 @@ fn free_spin_has_the_known_energy_drift() {
         let end = (0..1000).fold(start, |s, _| step(&problem, &s, 1e-3, method).state);
         energy(&end) / energy(&start) - 1.0
     };
-    assert!(
-        drift(Method::RungeKutta4).abs() < 1e-10,
-        "{:e}",
-        drift(Method::RungeKutta4)
-    );
+    assert!(drift(Method::RungeKutta4).abs() < 1e-10, "{:e}", drift(Method::RungeKutta4));
     let (backward, forward) = (drift(Method::BackwardEuler), drift(Method::ForwardEuler));
     assert!(backward < 0.0 && backward > -0.05, "{backward}");
     assert!(forward > 0.0 && forward < 0.05, "{forward}");
@@ -375,13 +296,8 @@ fn free_spin_has_the_known_energy_drift() {
 #[test]
 fn faults_keep_the_state_and_send_nothing() {
     let (body, coupling) = (ball(0.01), coupling(200.0, 2.0, 0.6, 0.01));
-    let good = State::moving(
-        &body,
-        Vector3::zeros(),
-        &UnitQuaternion::identity(),
-        &Vector3::x(),
-        &Vector3::zeros(),
-    );
+    let good =
+        State::moving(&body, Vector3::zeros(), &UnitQuaternion::identity(), &Vector3::x(), &Vector3::zeros());
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for method in METHODS {
             let mut handle = still_handle();
@@ -401,15 +317,8 @@ fn faults_keep_the_state_and_send_nothing() {
                 1e-3,
             )];
             let contact = ContactForce::Planes(&plane);
-            let result = step(
-                &Problem {
-                    contact,
-                    ..problem(&body, &coupling, &handle)
-                },
-                &good,
-                1e-3,
-                method,
-            );
+            let result =
+                step(&Problem { contact, ..problem(&body, &coupling, &handle) }, &good, 1e-3, method);
             assert!(result.state.is_finite() && result.feedback.is_finite() && result.contact.is_finite());
 
             let result = step(&problem(&body, &coupling, &handle), &good, bad, method);
@@ -419,14 +328,7 @@ fn faults_keep_the_state_and_send_nothing() {
         state.angular_momentum.z = bad;
         let handle = still_handle();
         assert!(
-            step(
-                &problem(&body, &coupling, &handle),
-                &state,
-                1e-3,
-                Method::BackwardEuler
-            )
-            .status
-            .is_fault()
+            step(&problem(&body, &coupling, &handle), &state, 1e-3, Method::BackwardEuler).status.is_fault()
         );
     }
 }
@@ -435,10 +337,7 @@ fn faults_keep_the_state_and_send_nothing() {
 #[test]
 fn divergence_ends_in_a_fault_and_not_in_a_force() {
     let (body, coupling) = (ball(1e-4), coupling(1e6, 0.0, 10.0, 0.0));
-    let handle = Handle {
-        position: Vector3::new(0.01, 0.0, 0.0),
-        ..still_handle()
-    };
+    let handle = Handle { position: Vector3::new(0.01, 0.0, 0.0), ..still_handle() };
     let problem = problem(&body, &coupling, &handle);
     let mut state = State::moving(
         &body,

@@ -19,10 +19,7 @@ pub fn minimum_jerk(u: f64) -> (f64, f64) {
         (1.0, 0.0)
     } else {
         let u2 = u * u;
-        (
-            u2 * u * (10.0 - 15.0 * u + 6.0 * u2),
-            30.0 * u2 * (1.0 - 2.0 * u + u2),
-        )
+        (u2 * u * (10.0 - 15.0 * u + 6.0 * u2), 30.0 * u2 * (1.0 - 2.0 * u + u2))
     }
 }
 
@@ -56,24 +53,12 @@ pub struct SineMotion {
 /// The hand of Fig. 2: 2.5 s in free space, up to 1.4 m/s.
 pub const FREE_SPACE: SineMotion = SineMotion {
     channels: [
-        Channel {
-            sines: &[[0.0430, 1.3, 0.3], [0.0122, 2.9, 1.1]],
-        },
-        Channel {
-            sines: &[[0.0860, 2.2, 2.0], [0.0074, 3.7, 0.4]],
-        },
-        Channel {
-            sines: &[[0.0550, 2.2, 3.4], [0.0122, 3.1, 2.2]],
-        },
-        Channel {
-            sines: &[[0.50, 1.7, 0.0], [0.10, 3.1, 1.0]],
-        },
-        Channel {
-            sines: &[[0.30, 1.3, 0.9]],
-        },
-        Channel {
-            sines: &[[0.35, 1.1, 2.5], [0.08, 2.7, 0.2]],
-        },
+        Channel { sines: &[[0.0430, 1.3, 0.3], [0.0122, 2.9, 1.1]] },
+        Channel { sines: &[[0.0860, 2.2, 2.0], [0.0074, 3.7, 0.4]] },
+        Channel { sines: &[[0.0550, 2.2, 3.4], [0.0122, 3.1, 2.2]] },
+        Channel { sines: &[[0.50, 1.7, 0.0], [0.10, 3.1, 1.0]] },
+        Channel { sines: &[[0.30, 1.3, 0.9]] },
+        Channel { sines: &[[0.35, 1.1, 2.5], [0.08, 2.7, 0.2]] },
     ],
     duration: 2.5,
     ramp: 0.4,
@@ -86,11 +71,8 @@ impl SineMotion {
         let c = self.channels.map(|c| c.at(t, self.duration, self.ramp));
         let [roll, pitch, yaw] = [c[3], c[4], c[5]];
         let about = |axis: Vector3<f64>, angle: f64| turn(axis * angle);
-        let (z, y, x) = (
-            about(Vector3::z(), yaw.0),
-            about(Vector3::y(), pitch.0),
-            about(Vector3::x(), roll.0),
-        );
+        let (z, y, x) =
+            (about(Vector3::z(), yaw.0), about(Vector3::y(), pitch.0), about(Vector3::x(), roll.0));
         let omega = Vector3::z() * yaw.1 + z * Vector3::y() * pitch.1 + (z * y) * Vector3::x() * roll.1;
         PoseRow {
             time: t,
@@ -116,17 +98,8 @@ impl SineMotion {
 fn turn(v: Vector3<f64>) -> UnitQuaternion<f64> {
     let angle = libm::sqrt(v.norm_squared());
     let half = 0.5 * angle;
-    let s = if angle > 1e-12 {
-        libm::sin(half) / angle
-    } else {
-        0.5
-    };
-    UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(
-        libm::cos(half),
-        v.x * s,
-        v.y * s,
-        v.z * s,
-    ))
+    let s = if angle > 1e-12 { libm::sin(half) / angle } else { 0.5 };
+    UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(libm::cos(half), v.x * s, v.y * s, v.z * s))
 }
 
 /// One value of six (x, y, z, roll, pitch, yaw) at a time; between way points it moves with minimum jerk.
@@ -148,11 +121,7 @@ impl WayPoints {
             Vector3::new(v[0], v[1], v[2]).into(),
             turn(Vector3::new(v[3], v[4], v[5])),
         );
-        PoseRow {
-            time: t,
-            pose,
-            velocity: None,
-        }
+        PoseRow { time: t, pose, velocity: None }
     }
 
     /// The motion at every `dt`, moved into the world by `world_from_motion`.
@@ -183,20 +152,12 @@ fn rows(
     world_from_motion: &Isometry3<f64>,
     at: impl Fn(f64) -> PoseRow,
 ) -> Result<Trajectory, TrajectoryError> {
-    let steps = if dt > 0.0 {
-        (duration / dt).round() as usize
-    } else {
-        0
-    };
+    let steps = if dt > 0.0 { (duration / dt).round() as usize } else { 0 };
     let rows = (0..=steps)
         .map(|i| {
             let row = at(i as f64 * dt);
             let turned = row.velocity.map(|v| v.map(|u| world_from_motion.rotation * u));
-            PoseRow {
-                pose: world_from_motion * row.pose,
-                velocity: turned,
-                ..row
-            }
+            PoseRow { pose: world_from_motion * row.pose, velocity: turned, ..row }
         })
         .collect();
     Trajectory::from_rows(rows, "built-in motion")
@@ -224,10 +185,7 @@ mod tests {
     fn way_points_are_met_and_left_smoothly() {
         let mut channels: [Vec<(f64, f64)>; 6] = Default::default();
         channels[1] = vec![(0.0, 0.0), (0.2, 0.0195), (0.4, -0.0195), (0.6, 0.0)];
-        let motion = WayPoints {
-            channels,
-            duration: 0.65,
-        };
+        let motion = WayPoints { channels, duration: 0.65 };
         let y = |t| motion.at(t).pose.translation.vector.y;
         assert_eq!(y(0.2), 0.0195);
         assert!((y(0.1) - 0.00975).abs() < 1e-15);

@@ -39,15 +39,8 @@ pub struct PoseRow {
 /// # Errors
 /// A table that cannot be read, lacks a column, or holds a number that is none or not finite, or a quaternion far from unit length.
 pub fn read_poses(bytes: &[u8], name: &str) -> Result<Vec<PoseRow>, TrajectoryError> {
-    let fail = |line: Option<u64>, problem: String| TrajectoryError {
-        file: name.to_owned(),
-        line,
-        problem,
-    };
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_reader(bytes);
+    let fail = |line: Option<u64>, problem: String| TrajectoryError { file: name.to_owned(), line, problem };
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
     let header = reader.headers().map_err(|e| fail(None, e.to_string()))?.clone();
     let column = |wanted: &str| header.iter().position(|h| h == wanted);
     let mut columns = Vec::with_capacity(14);
@@ -55,10 +48,7 @@ pub fn read_poses(bytes: &[u8], name: &str) -> Result<Vec<PoseRow>, TrajectoryEr
         let Some(index) = column(wanted) else {
             return Err(fail(
                 Some(1),
-                format!(
-                    "column '{wanted}' is missing; the header must be '{}'",
-                    POSE.join(",")
-                ),
+                format!("column '{wanted}' is missing; the header must be '{}'", POSE.join(",")),
             ));
         };
         columns.push(index);
@@ -89,23 +79,14 @@ pub fn read_poses(bytes: &[u8], name: &str) -> Result<Vec<PoseRow>, TrajectoryEr
         if !((q.norm() - 1.0).abs() <= UNIT_TOLERANCE) {
             return Err(fail(
                 line,
-                format!(
-                    "quaternion of length {}; it must be a unit quaternion qw,qx,qy,qz",
-                    q.norm()
-                ),
+                format!("quaternion of length {}; it must be a unit quaternion qw,qx,qy,qz", q.norm()),
             ));
         }
-        let pose = Isometry3::from_parts(
-            Translation3::new(v[1], v[2], v[3]),
-            UnitQuaternion::new_normalize(q),
-        );
+        let pose =
+            Isometry3::from_parts(Translation3::new(v[1], v[2], v[3]), UnitQuaternion::new_normalize(q));
         let velocity = (columns.len() == 14)
             .then(|| [Vector3::new(v[8], v[9], v[10]), Vector3::new(v[11], v[12], v[13])]);
-        rows.push(PoseRow {
-            time: v[0],
-            pose,
-            velocity,
-        });
+        rows.push(PoseRow { time: v[0], pose, velocity });
     }
     Ok(rows)
 }
@@ -144,11 +125,7 @@ impl Trajectory {
     /// # Errors
     /// Fewer than two rows, or times that do not rise.
     pub fn from_rows(rows: Vec<PoseRow>, name: &str) -> Result<Self, TrajectoryError> {
-        let fail = |line, problem: String| TrajectoryError {
-            file: name.to_owned(),
-            line,
-            problem,
-        };
+        let fail = |line, problem: String| TrajectoryError { file: name.to_owned(), line, problem };
         if rows.len() < 2 {
             let text = format!("{} rows; a trajectory needs at least two", rows.len());
             return Err(fail(None, text));
@@ -192,10 +169,7 @@ impl Trajectory {
         let [linear_velocity, angular_velocity] = velocity.unwrap_or_else(|| {
             let (before, _) = self.at(time - dt);
             let turn = pose.rotation * before.rotation.inverse();
-            [
-                (pose.translation.vector - before.translation.vector) / dt,
-                turn.scaled_axis() / dt,
-            ]
+            [(pose.translation.vector - before.translation.vector) / dt, turn.scaled_axis() / dt]
         });
         DeviceSample {
             time,
@@ -238,9 +212,7 @@ mod tests {
     const HEADER: &str = "t,px,py,pz,qw,qx,qy,qz\n";
 
     fn error(text: &str) -> String {
-        Trajectory::parse(text.as_bytes(), "x.csv")
-            .unwrap_err()
-            .to_string()
+        Trajectory::parse(text.as_bytes(), "x.csv").unwrap_err().to_string()
     }
 
     #[test]

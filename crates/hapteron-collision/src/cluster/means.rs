@@ -35,26 +35,14 @@ pub(super) struct Center {
 
 impl Center {
     pub(super) fn new(id: Option<u64>, point: Vector3<f64>, normal: Vector3<f64>) -> Self {
-        Self {
-            id,
-            point,
-            normal,
-            depth: 0.0,
-            weight: 0.0,
-            contacts: 0,
-            agreement: 1.0,
-        }
+        Self { id, point, normal, depth: 0.0, weight: 0.0, contacts: 0, agreement: 1.0 }
     }
 }
 
 /// Squared distance in position and normal; normals on opposite walls of a slot are a radius apart.
 fn distance(sample: &Sample, center: &Center, radius: f64) -> f64 {
     let turn = (sample.normal - center.normal).norm_squared();
-    let scale = if radius.is_finite() {
-        0.25 * radius * radius
-    } else {
-        1.0
-    };
+    let scale = if radius.is_finite() { 0.25 * radius * radius } else { 1.0 };
     (sample.point - center.point).norm_squared() + scale * turn
 }
 
@@ -88,10 +76,8 @@ fn seed(parameters: &ClusterParameters, samples: &[Sample], centers: &mut Vec<Ce
     while centers.len() < parameters.max_clusters {
         let mut best: Option<(f64, usize)> = None;
         for (index, sample) in samples.iter().enumerate().filter(|(_, s)| s.weight > 0.0) {
-            let nearest = centers
-                .iter()
-                .map(|c| distance(sample, c, parameters.radius))
-                .fold(f64::INFINITY, f64::min);
+            let nearest =
+                centers.iter().map(|c| distance(sample, c, parameters.radius)).fold(f64::INFINITY, f64::min);
             // Without any center the heaviest comes first.
             let urgency = sample.weight * if nearest.is_finite() { nearest } else { 1.0 };
             if nearest > radius2 && best.is_none_or(|(most, _)| urgency > most) {
@@ -152,18 +138,11 @@ fn average(samples: &[Sample], centers: &mut [Center]) {
 /// Splits one cluster whose normals cancel, along the normal of its heaviest sample. With no room for another cluster the
 /// weaker side is left out, since a mean of opposite normals would push nowhere.
 fn split(parameters: &ClusterParameters, samples: &mut Vec<Sample>, centers: &mut Vec<Center>) -> bool {
-    let Some(index) = centers
-        .iter()
-        .position(|c| c.weight > 0.0 && c.agreement < CANCELLING)
-    else {
+    let Some(index) = centers.iter().position(|c| c.weight > 0.0 && c.agreement < CANCELLING) else {
         return false;
     };
     let own = |s: &&Sample| s.center == index && s.weight > 0.0;
-    let Some(heaviest) = samples
-        .iter()
-        .filter(own)
-        .max_by(|a, b| a.weight.total_cmp(&b.weight))
-        .copied()
+    let Some(heaviest) = samples.iter().filter(own).max_by(|a, b| a.weight.total_cmp(&b.weight)).copied()
     else {
         return false;
     };
@@ -174,10 +153,7 @@ fn split(parameters: &ClusterParameters, samples: &mut Vec<Sample>, centers: &mu
     }
     let against = |s: &Sample| s.center == index && s.normal.dot(&heaviest.normal) < 0.0;
     if room {
-        samples
-            .iter_mut()
-            .filter(|s| against(s))
-            .for_each(|s| s.center = other);
+        samples.iter_mut().filter(|s| against(s)).for_each(|s| s.center = other);
     } else {
         samples.retain(|s| !against(s));
     }

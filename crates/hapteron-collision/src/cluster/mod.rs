@@ -62,11 +62,7 @@ impl Clusterer {
     /// A clusterer without clusters; no maximum and a radius that is not positive count as 1 and infinite.
     #[must_use]
     pub fn new(parameters: ClusterParameters) -> Self {
-        let radius = if parameters.radius > 0.0 {
-            parameters.radius
-        } else {
-            f64::INFINITY
-        };
+        let radius = if parameters.radius > 0.0 { parameters.radius } else { f64::INFINITY };
         let max_clusters = parameters.max_clusters.max(1);
         Self {
             parameters: ClusterParameters { max_clusters, radius },
@@ -97,14 +93,9 @@ impl Clusterer {
         let reach = 2.0 * self.parameters.radius;
         for seed in &self.seeds {
             let point = (world_from_body * seed.point).coords;
-            if self
-                .samples
-                .iter()
-                .any(|s| (s.point - point).norm_squared() < reach * reach)
-            {
+            if self.samples.iter().any(|s| (s.point - point).norm_squared() < reach * reach) {
                 let normal = world_from_body * seed.normal;
-                self.centers
-                    .push(means::Center::new(Some(seed.id), point, normal));
+                self.centers.push(means::Center::new(Some(seed.id), point, normal));
             }
         }
         means::cluster(&self.parameters, &self.samples, &mut self.centers);
@@ -137,11 +128,7 @@ impl Clusterer {
         self.samples.clear();
         for contact in contacts {
             let weight = contact.weight * (tolerance + contact.depth).max(0.0);
-            let finite = contact
-                .point_body
-                .iter()
-                .chain(contact.normal.iter())
-                .all(|c| c.is_finite());
+            let finite = contact.point_body.iter().chain(contact.normal.iter()).all(|c| c.is_finite());
             if !(finite && weight.is_finite() && contact.depth.is_finite()) {
                 self.ignored += 1;
                 continue;

@@ -146,17 +146,12 @@ fn count_edges(mesh: &TriMesh, edges: &[([u32; 2], bool)], report: &mut MeshRepo
         };
         *defect += 1;
         if report.defects.len() < SHOWN {
-            report
-                .defects
-                .push(crate::vector::scale(crate::vector::add(a, b), 0.5));
+            report.defects.push(crate::vector::scale(crate::vector::add(a, b), 0.5));
         }
     }
     let middle = lengths.len() / 2;
-    report.median_edge = if lengths.is_empty() {
-        0.0
-    } else {
-        *lengths.select_nth_unstable_by(middle, f64::total_cmp).1
-    };
+    report.median_edge =
+        if lengths.is_empty() { 0.0 } else { *lengths.select_nth_unstable_by(middle, f64::total_cmp).1 };
 }
 
 fn area(mesh: &TriMesh) -> f64 {
@@ -212,10 +207,7 @@ impl fmt::Display for MeshReport {
         let defects = [
             ("boundary edges", self.boundary_edges),
             ("edges with more than two faces", self.non_manifold_edges),
-            (
-                "edges between faces of opposite orientation",
-                self.inconsistent_edges,
-            ),
+            ("edges between faces of opposite orientation", self.inconsistent_edges),
             ("triangles without area, left out", self.dropped_triangles),
             ("duplicate triangles", self.duplicate_triangles),
             ("coinciding vertices, joined", self.duplicate_vertices),

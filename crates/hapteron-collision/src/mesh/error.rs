@@ -15,26 +15,15 @@ pub struct MeshError {
 
 impl MeshError {
     pub(super) fn new(file: &str, problem: MeshProblem) -> Self {
-        Self {
-            file: file.to_owned(),
-            line: None,
-            problem,
-        }
+        Self { file: file.to_owned(), line: None, problem }
     }
 
     pub(super) fn at(line: usize, problem: MeshProblem) -> Self {
-        Self {
-            file: String::new(),
-            line: Some(line),
-            problem,
-        }
+        Self { file: String::new(), line: Some(line), problem }
     }
 
     pub(super) fn in_file(self, file: &str) -> Self {
-        Self {
-            file: file.to_owned(),
-            ..self
-        }
+        Self { file: file.to_owned(), ..self }
     }
 }
 

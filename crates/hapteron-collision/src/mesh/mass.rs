@@ -72,10 +72,7 @@ pub(super) fn integrate(mesh: &TriMesh) -> MassProperties {
         let sum: Vec3 = add(a, add(b, c));
         first = add(first, scale(sum, six / 24.0));
         let moment = |i: usize, j: usize| a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + sum[i] * sum[j];
-        for (k, (i, j)) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)]
-            .into_iter()
-            .enumerate()
-        {
+        for (k, (i, j)) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)].into_iter().enumerate() {
             second[k] += six / 120.0 * moment(i, j);
         }
     }

@@ -40,37 +40,23 @@ impl TriMesh {
         }
         for (index, vertex) in vertices.iter().enumerate() {
             if let Some(&value) = vertex.iter().find(|c| !(c.abs() <= LARGEST_COORDINATE)) {
-                return Err(MeshError::new(
-                    "mesh",
-                    MeshProblem::Coordinate { vertex: index, value },
-                ));
+                return Err(MeshError::new("mesh", MeshProblem::Coordinate { vertex: index, value }));
             }
         }
         let count = vertices.len();
         for (index, triangle) in triangles.iter().enumerate() {
             if let Some(&bad) = triangle.iter().find(|&&v| v as usize >= count) {
-                let problem = MeshProblem::Index {
-                    face: index,
-                    index: i64::from(bad),
-                    vertices: count,
-                };
+                let problem = MeshProblem::Index { face: index, index: i64::from(bad), vertices: count };
                 return Err(MeshError::new("mesh", problem));
             }
         }
         let all = triangles.len();
         triangles.retain(|t| has_area(t.map(|v| vertices[v as usize])));
         if triangles.is_empty() {
-            return Err(MeshError::new(
-                "mesh",
-                MeshProblem::NoTriangles { without_area: all },
-            ));
+            return Err(MeshError::new("mesh", MeshProblem::NoTriangles { without_area: all }));
         }
         let dropped = all - triangles.len();
-        Ok(Self {
-            vertices,
-            triangles,
-            dropped,
-        })
+        Ok(Self { vertices, triangles, dropped })
     }
 
     /// Vertices, metres, mesh frame.
@@ -101,10 +87,7 @@ impl TriMesh {
         }
         let vertices = self.vertices.iter().map(|v| v.map(|c| c * factor)).collect();
         let scaled = Self::new(vertices, self.triangles.clone())?;
-        Ok(Self {
-            dropped: self.dropped + scaled.dropped,
-            ..scaled
-        })
+        Ok(Self { dropped: self.dropped + scaled.dropped, ..scaled })
     }
 
     /// Least and greatest coordinates of the vertices that belong to a triangle.
@@ -127,14 +110,8 @@ impl TriMesh {
     pub fn bounding_sphere(&self) -> ([f64; 3], f64) {
         let [low, high] = self.bounds();
         let center = crate::vector::scale(crate::vector::add(low, high), 0.5);
-        let used = self
-            .triangles
-            .iter()
-            .flatten()
-            .map(|&v| self.vertices[v as usize]);
-        let radius = used
-            .map(|v| crate::vector::norm(crate::vector::sub(v, center)))
-            .fold(0.0, f64::max);
+        let used = self.triangles.iter().flatten().map(|&v| self.vertices[v as usize]);
+        let radius = used.map(|v| crate::vector::norm(crate::vector::sub(v, center))).fold(0.0, f64::max);
         (center, radius)
     }
 }

@@ -16,16 +16,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
             continued.push(' ');
             continue;
         }
-        let whole = if continued.is_empty() {
-            line.to_owned()
-        } else {
-            std::mem::take(&mut continued) + line
-        };
-        let mut words = whole
-            .split('#')
-            .next()
-            .unwrap_or_default()
-            .split_ascii_whitespace();
+        let whole =
+            if continued.is_empty() { line.to_owned() } else { std::mem::take(&mut continued) + line };
+        let mut words = whole.split('#').next().unwrap_or_default().split_ascii_whitespace();
         let result = match words.next() {
             Some("v") => vertex(words).map(|v| vertices.push(v)),
             Some("f") => face(words, vertices.len()).map(|corners| faces.push((number, corners))),
@@ -40,17 +33,12 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
             .map(|&index| match u32::try_from(index) {
                 Ok(v) if (v as usize) < vertices.len() => Ok(v),
                 // Counted from 1 in the file.
-                _ => Err(MeshProblem::Index {
-                    face,
-                    index: index.saturating_add(1),
-                    vertices: vertices.len(),
-                }),
+                _ => {
+                    Err(MeshProblem::Index { face, index: index.saturating_add(1), vertices: vertices.len() })
+                }
             })
             .collect();
-        fan(
-            &corners.map_err(|problem| MeshError::at(*line, problem))?,
-            &mut triangles,
-        );
+        fan(&corners.map_err(|problem| MeshError::at(*line, problem))?, &mut triangles);
     }
     Ok((vertices, triangles))
 }
@@ -79,9 +67,7 @@ fn face<'a>(words: impl Iterator<Item = &'a str>, vertices_so_far: usize) -> Res
         .collect();
     let corners = corners?;
     if corners.len() < 3 {
-        return Err(MeshProblem::FewCorners {
-            corners: corners.len(),
-        });
+        return Err(MeshProblem::FewCorners { corners: corners.len() });
     }
     Ok(corners)
 }

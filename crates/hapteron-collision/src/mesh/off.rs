@@ -6,10 +6,7 @@ use super::{Raw, fan};
 
 /// Whether the first word is OFF with one of its prefixes.
 pub(super) fn is_off(bytes: &[u8]) -> bool {
-    let first = bytes
-        .split(u8::is_ascii_whitespace)
-        .find(|w| !w.is_empty())
-        .unwrap_or_default();
+    let first = bytes.split(u8::is_ascii_whitespace).find(|w| !w.is_empty()).unwrap_or_default();
     first.ends_with(b"OFF") && first.len() <= 7
 }
 
@@ -27,10 +24,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
             return Err(MeshError::at(line, MeshProblem::Syntax(text)));
         }
     };
-    let announced: [u64; 2] = [
-        words.number("the number of vertices")?,
-        words.number("the number of faces")?,
-    ];
+    let announced: [u64; 2] = [words.number("the number of vertices")?, words.number("the number of faces")?];
     let _edges: u64 = words.number("the number of edges")?;
     let at = |words: &Words<'_>, p| MeshError::at(words.line(), p);
     let count =
@@ -61,14 +55,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
             match u32::try_from(index) {
                 Ok(v) if (v as usize) < count => corners.push(v),
                 _ => {
-                    return Err(at(
-                        &words,
-                        MeshProblem::Index {
-                            face,
-                            index,
-                            vertices: count,
-                        },
-                    ));
+                    return Err(at(&words, MeshProblem::Index { face, index, vertices: count }));
                 }
             }
         }

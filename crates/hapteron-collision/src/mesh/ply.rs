@@ -78,10 +78,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
     let (encoding, elements, lines, body) = header(bytes)?;
     let mut source = match encoding {
         Encoding::Text => Source::Text(Words::new(body, lines)),
-        _ => Source::Binary {
-            rest: body,
-            little: encoding == Encoding::Little,
-        },
+        _ => Source::Binary { rest: body, little: encoding == Encoding::Little },
     };
     let mut vertices = Vec::new();
     let mut triangles = Vec::new();
@@ -119,10 +116,7 @@ fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, usize, &[u8]), MeshEr
     let mut offset = 0;
     for (number, line) in text::lines(bytes) {
         let fail = |text: String| Err(MeshError::at(number, MeshProblem::Syntax(text)));
-        offset += bytes[offset..]
-            .iter()
-            .position(|&b| b == b'\n')
-            .map_or(bytes.len() - offset, |i| i + 1);
+        offset += bytes[offset..].iter().position(|&b| b == b'\n').map_or(bytes.len() - offset, |i| i + 1);
         let words: Vec<&str> = line.split_ascii_whitespace().take(8).collect();
         match words.as_slice() {
             ["ply"] if number == 1 => {}
@@ -134,11 +128,7 @@ fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, usize, &[u8]), MeshEr
             ["element", name, count] => {
                 let count =
                     text::number(count, "the number of entries").map_err(|p| MeshError::at(number, p))?;
-                elements.push(Element {
-                    name: (*name).into(),
-                    count,
-                    properties: Vec::new(),
-                });
+                elements.push(Element { name: (*name).into(), count, properties: Vec::new() });
             }
             ["property", kind @ .., name] => {
                 let Some(property) = property(kind, name) else {
@@ -172,11 +162,7 @@ fn property(kind: &[&str], name: &str) -> Option<Property> {
         [value] => (None, Scalar::named(value)?),
         _ => return None,
     };
-    Some(Property {
-        name: name.into(),
-        length,
-        value,
-    })
+    Some(Property { name: name.into(), length, value })
 }
 
 fn read_vertices(
@@ -185,11 +171,7 @@ fn read_vertices(
     count: usize,
     vertices: &mut Vec<[f64; 3]>,
 ) -> Result<(), MeshError> {
-    let axis = |p: &Property| {
-        ["x", "y", "z"]
-            .iter()
-            .position(|&n| n == p.name && p.length.is_none())
-    };
+    let axis = |p: &Property| ["x", "y", "z"].iter().position(|&n| n == p.name && p.length.is_none());
     let axes: Vec<Option<usize>> = element.properties.iter().map(axis).collect();
     if (0..3).any(|k| !axes.contains(&Some(k))) {
         return Err(source.error(MeshProblem::Syntax("the vertices lack x, y or z".into())));
@@ -219,9 +201,7 @@ fn read_faces(
     let is_corners =
         |p: &Property| p.length.is_some() && (p.name == "vertex_indices" || p.name == "vertex_index");
     if !element.properties.iter().any(is_corners) {
-        return Err(source.error(MeshProblem::Syntax(
-            "the faces have no list 'vertex_indices'".into(),
-        )));
+        return Err(source.error(MeshProblem::Syntax("the faces have no list 'vertex_indices'".into())));
     }
     let mut corners: Vec<f64> = Vec::new();
     for face in 0..count {
@@ -235,18 +215,12 @@ fn read_faces(
             })?;
         }
         if corners.len() < 3 {
-            return Err(source.error(MeshProblem::FewCorners {
-                corners: corners.len(),
-            }));
+            return Err(source.error(MeshProblem::FewCorners { corners: corners.len() }));
         }
         let mut indices = Vec::with_capacity(corners.len());
         for &corner in &corners {
             if !(corner >= 0.0 && corner < vertices as f64 && corner.fract() == 0.0) {
-                return Err(source.error(MeshProblem::Index {
-                    face,
-                    index: corner as i64,
-                    vertices,
-                }));
+                return Err(source.error(MeshProblem::Index { face, index: corner as i64, vertices }));
             }
             indices.push(corner as u32);
         }
@@ -286,11 +260,7 @@ impl Source<'_> {
         if !(announced >= 0.0 && announced.fract() == 0.0) {
             return Err(self.error(MeshProblem::Syntax(format!("a list of length {announced}"))));
         }
-        let least = if matches!(self, Self::Text(_)) {
-            2
-        } else {
-            property.value.size()
-        };
+        let least = if matches!(self, Self::Text(_)) { 2 } else { property.value.size() };
         let count = text::check_count("list entries", announced as u64, self.remaining(), least)
             .map_err(|p| self.error(p))?;
         for _ in 0..count {

@@ -16,9 +16,7 @@ pub(super) fn is_binary(bytes: &[u8]) -> bool {
 
 fn announced(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(80..HEADER)?;
-    Some(u64::from(u32::from_le_bytes([
-        count[0], count[1], count[2], count[3],
-    ])))
+    Some(u64::from(u32::from_le_bytes([count[0], count[1], count[2], count[3]])))
 }
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
@@ -66,24 +64,14 @@ fn binary_facets(bytes: &[u8]) -> Result<Raw, MeshError> {
         }
         let coordinate = |i: usize| {
             let at = 12 + 4 * i;
-            f64::from(f32::from_le_bytes([
-                facet[at],
-                facet[at + 1],
-                facet[at + 2],
-                facet[at + 3],
-            ]))
+            f64::from(f32::from_le_bytes([facet[at], facet[at + 1], facet[at + 2], facet[at + 3]]))
         };
         triangles
             .push([0, 3, 6].map(|i| welder.index([coordinate(i), coordinate(i + 1), coordinate(i + 2)])));
     }
     if (triangles.len() as u64) < announced {
         let room = triangles.len() as u64;
-        return Err(MeshProblem::Lying {
-            what: "triangles",
-            announced,
-            room,
-        }
-        .into());
+        return Err(MeshProblem::Lying { what: "triangles", announced, room }.into());
     }
     Ok((welder.vertices, triangles))
 }
@@ -113,12 +101,7 @@ fn text_facets(bytes: &[u8]) -> Result<Raw, MeshError> {
             }
             "endloop" => {
                 if corners.len() < 3 {
-                    return Err(MeshError::at(
-                        line,
-                        MeshProblem::FewCorners {
-                            corners: corners.len(),
-                        },
-                    ));
+                    return Err(MeshError::at(line, MeshProblem::FewCorners { corners: corners.len() }));
                 }
                 super::fan(&corners, &mut triangles);
                 corners.clear();
@@ -126,10 +109,8 @@ fn text_facets(bytes: &[u8]) -> Result<Raw, MeshError> {
             "solid" | "endsolid" | "facet" => words.skip_line(),
             "outer" | "loop" | "endfacet" => {}
             other => {
-                let text = format!(
-                    "unexpected word '{}' in a text STL",
-                    other.chars().take(40).collect::<String>()
-                );
+                let text =
+                    format!("unexpected word '{}' in a text STL", other.chars().take(40).collect::<String>());
                 return Err(MeshError::at(line, MeshProblem::Syntax(text)));
             }
         }

@@ -4,10 +4,7 @@ use super::error::{MeshError, MeshProblem};
 
 /// The lines of a file with their numbers, from 1; bytes that are not UTF-8 become replacement characters.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, std::borrow::Cow<'_, str>)> {
-    bytes
-        .split(|&b| b == b'\n')
-        .enumerate()
-        .map(|(i, line)| (i + 1, String::from_utf8_lossy(line)))
+    bytes.split(|&b| b == b'\n').enumerate().map(|(i, line)| (i + 1, String::from_utf8_lossy(line)))
 }
 
 /// All words of a file outside `#` comments, each with its line.
@@ -31,22 +28,14 @@ impl<'a> Words<'a> {
                     self.rest = &self.rest[1..];
                 }
                 Some(b'#') => {
-                    let end = self
-                        .rest
-                        .iter()
-                        .position(|&b| b == b'\n')
-                        .unwrap_or(self.rest.len());
+                    let end = self.rest.iter().position(|&b| b == b'\n').unwrap_or(self.rest.len());
                     self.rest = &self.rest[end..];
                 }
                 Some(b) if b.is_ascii_whitespace() => self.rest = &self.rest[1..],
                 Some(_) => break,
             }
         }
-        let end = self
-            .rest
-            .iter()
-            .position(u8::is_ascii_whitespace)
-            .unwrap_or(self.rest.len());
+        let end = self.rest.iter().position(u8::is_ascii_whitespace).unwrap_or(self.rest.len());
         let (word, rest) = self.rest.split_at(end);
         self.rest = rest;
         let word = std::str::from_utf8(word)
@@ -65,11 +54,7 @@ impl<'a> Words<'a> {
 
     /// The rest of the line that the last word is on.
     pub(super) fn skip_line(&mut self) {
-        let end = self
-            .rest
-            .iter()
-            .position(|&b| b == b'\n')
-            .unwrap_or(self.rest.len());
+        let end = self.rest.iter().position(|&b| b == b'\n').unwrap_or(self.rest.len());
         self.rest = &self.rest[end..];
     }
 
@@ -81,10 +66,7 @@ impl<'a> Words<'a> {
 
 /// A number in a word.
 pub(super) fn number<T: std::str::FromStr>(word: &str, what: &'static str) -> Result<T, MeshProblem> {
-    word.parse().map_err(|_| MeshProblem::NotANumber {
-        what,
-        found: word.chars().take(40).collect(),
-    })
+    word.parse().map_err(|_| MeshProblem::NotANumber { what, found: word.chars().take(40).collect() })
 }
 
 /// Refuses a count for which the rest of a file has no room, before anything is allocated for it.
@@ -97,10 +79,6 @@ pub(super) fn check_count(
     let room = (remaining / least_bytes.max(1)) as u64 + 1;
     match usize::try_from(announced) {
         Ok(count) if announced <= room => Ok(count),
-        _ => Err(MeshProblem::Lying {
-            what,
-            announced,
-            room,
-        }),
+        _ => Err(MeshProblem::Lying { what, announced, room }),
     }
 }

@@ -72,19 +72,13 @@ pub(super) fn closest_on_triangle(
     let va = d3 * d6 - d5 * d4;
     let (toward_c, toward_b) = (d4 - d3, d5 - d6);
     if va <= 0.0 && toward_c >= 0.0 && toward_b >= 0.0 {
-        return (
-            add(b, scale(sub(c, b), toward_c / (toward_c + toward_b))),
-            edge(1),
-        );
+        return (add(b, scale(sub(c, b), toward_c / (toward_c + toward_b))), edge(1));
     }
     let whole = va + vb + vc;
     if whole <= 0.0 {
         return (a, vertex(0));
     }
-    (
-        add(a, add(scale(ab, vb / whole), scale(ac, vc / whole))),
-        Feature::Face(triangle),
-    )
+    (add(a, add(scale(ab, vb / whole), scale(ac, vc / whole))), Feature::Face(triangle))
 }
 
 /// Foot of `p` on one triangle of the surface, with the side taken from the closest feature's normal.
@@ -95,16 +89,10 @@ pub(super) fn foot(p: Vec3, triangle: u32, surface: &Surface) -> Foot {
     let from = sub(p, point);
     let distance = norm(from);
     let (outward, sided) = match feature {
-        Feature::Face(_) => (
-            cross(sub(corners[1], corners[0]), sub(corners[2], corners[0])),
-            true,
-        ),
+        Feature::Face(_) => (cross(sub(corners[1], corners[0]), sub(corners[2], corners[0])), true),
         Feature::Edge(e) => {
             let edge = &surface.edges[e as usize];
-            (
-                edge.normal.map(f64::from),
-                matches!(edge.kind, EdgeKind::Convex | EdgeKind::Hollow),
-            )
+            (edge.normal.map(f64::from), matches!(edge.kind, EdgeKind::Convex | EdgeKind::Hollow))
         }
         Feature::Vertex(v) => {
             let n = &surface.vertex_normals[v as usize];
@@ -112,19 +100,9 @@ pub(super) fn foot(p: Vec3, triangle: u32, surface: &Surface) -> Foot {
         }
     };
     if distance < TOUCHING {
-        return Foot {
-            point,
-            feature,
-            signed_distance: 0.0,
-            normal: unit_or_zero(outward),
-        };
+        return Foot { point, feature, signed_distance: 0.0, normal: unit_or_zero(outward) };
     }
     let inside = sided && dot(from, outward) < 0.0;
     let sign = if inside { -1.0 } else { 1.0 };
-    Foot {
-        point,
-        feature,
-        signed_distance: sign * distance,
-        normal: scale(from, sign / distance),
-    }
+    Foot { point, feature, signed_distance: sign * distance, normal: scale(from, sign / distance) }
 }

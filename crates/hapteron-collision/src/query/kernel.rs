@@ -24,9 +24,7 @@ impl Box32 {
     /// Length of the diagonal, squared.
     #[inline(always)]
     pub(super) fn extent(&self) -> f32 {
-        (0..3)
-            .map(|k| (self.max[k] - self.min[k]) * (self.max[k] - self.min[k]))
-            .sum()
+        (0..3).map(|k| (self.max[k] - self.min[k]) * (self.max[k] - self.min[k])).sum()
     }
 }
 
@@ -137,10 +135,7 @@ pub(super) fn overlapping_children(node: &Node, b: &Box32) -> u32 {
 /// The boxes of a node's children after a rigid motion, each grown by `margin` on all sides.
 #[inline(always)]
 pub(super) fn moved_children(node: &Node, motion: &Rigid, margin: f32) -> [Box32; LANES] {
-    let mut result = [Box32 {
-        min: [0.0; 3],
-        max: [0.0; 3],
-    }; LANES];
+    let mut result = [Box32 { min: [0.0; 3], max: [0.0; 3] }; LANES];
     for row in 0..3 {
         let r = motion.rotation[row].map(|c| c as f32);
         let t = motion.translation[row] as f32;
@@ -184,11 +179,7 @@ pub(super) fn point_triangles(p: Vec3, b: &TriangleBlock) -> (f64, usize) {
     for l in 0..LANES {
         let ab = [b.edge1[0][l], b.edge1[1][l], b.edge1[2][l]];
         let ac = [b.edge2[0][l], b.edge2[1][l], b.edge2[2][l]];
-        let ap = [
-            p[0] - b.corner[0][l],
-            p[1] - b.corner[1][l],
-            p[2] - b.corner[2][l],
-        ];
+        let ap = [p[0] - b.corner[0][l], p[1] - b.corner[1][l], p[2] - b.corner[2][l]];
         let d1 = ab[0] * ap[0] + ab[1] * ap[1] + ab[2] * ap[2];
         let d2 = ac[0] * ap[0] + ac[1] * ap[1] + ac[2] * ap[2];
         let aa = ab[0] * ab[0] + ab[1] * ab[1] + ab[2] * ab[2];
@@ -227,11 +218,7 @@ pub(super) fn point_triangles(p: Vec3, b: &TriangleBlock) -> (f64, usize) {
         whole = if at_a { 1.0 } else { whole };
         let inverse = 1.0 / whole;
         let (v, w) = (v * inverse, w * inverse);
-        let e = [
-            ap[0] - v * ab[0] - w * ac[0],
-            ap[1] - v * ab[1] - w * ac[1],
-            ap[2] - v * ab[2] - w * ac[2],
-        ];
+        let e = [ap[0] - v * ab[0] - w * ac[0], ap[1] - v * ab[1] - w * ac[1], ap[2] - v * ab[2] - w * ac[2]];
         squared[l] = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
     }
     first_least(&squared)
@@ -297,11 +284,7 @@ pub(super) fn ridge_ridges(
     let a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     for l in 0..LANES {
         let e = [block.along[0][l], block.along[1][l], block.along[2][l]];
-        let r = [
-            p[0] - block.start[0][l],
-            p[1] - block.start[1][l],
-            p[2] - block.start[2][l],
-        ];
+        let r = [p[0] - block.start[0][l], p[1] - block.start[1][l], p[2] - block.start[2][l]];
         let ee = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
         let b = d[0] * e[0] + d[1] * e[1] + d[2] * e[2];
         let c = d[0] * r[0] + d[1] * r[1] + d[2] * r[2];
@@ -311,11 +294,7 @@ pub(super) fn ridge_ridges(
         let s = (b * f - c * ee) * inverse;
         let t = (a * f - b * c) * inverse;
         // From the point on the first edge to that on the block's.
-        let u = [
-            e[0] * t - d[0] * s - r[0],
-            e[1] * t - d[1] * s - r[1],
-            e[2] * t - d[2] * s - r[2],
-        ];
+        let u = [e[0] * t - d[0] * s - r[0], e[1] * t - d[1] * s - r[1], e[2] * t - d[2] * s - r[2]];
         let squared = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
         let side = u[0] * outward[0] + u[1] * outward[1] + u[2] * outward[2];
         let limit = within_squared.min(block.within_squared[l]);

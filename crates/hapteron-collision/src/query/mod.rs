@@ -87,10 +87,7 @@ impl QueryWorkspace {
             step = walk::displacement(root, &known.last, pair.motion);
             let moved = walk::displacement(root, &known.motion, pair.motion);
             if pair.tolerance + moved <= known.reach {
-                self.collected = Some(Collected {
-                    last: *pair.motion,
-                    ..known
-                });
+                self.collected = Some(Collected { last: *pair.motion, ..known });
                 return;
             }
         } else {
@@ -105,12 +102,7 @@ impl QueryWorkspace {
         };
         let reach = pair.tolerance + ahead;
         walk::walk(pair, reach, &mut self.walk);
-        self.collected = Some(Collected {
-            surfaces,
-            motion: *pair.motion,
-            reach,
-            last: *pair.motion,
-        });
+        self.collected = Some(Collected { surfaces, motion: *pair.motion, reach, last: *pair.motion });
     }
 }
 
@@ -142,61 +134,26 @@ pub fn query<'a>(
     let valid =
         tolerance > 0.0 && tolerance.is_finite() && is_finite(&relative) && is_finite(world_from_obstacle);
     if !valid || body.nodes.is_empty() || obstacle.nodes.is_empty() {
-        return QueryResult {
-            min_distance: f64::INFINITY,
-            contacts: &workspace.contacts,
-        };
+        return QueryResult { min_distance: f64::INFINITY, contacts: &workspace.contacts };
     }
     let motion = Rigid::from_isometry(&relative);
     let inverse = Rigid::from_isometry(&relative.inverse());
-    let pair = Pair {
-        body,
-        obstacle,
-        motion: &motion,
-        inverse: &inverse,
-        tolerance,
-    };
+    let pair = Pair { body, obstacle, motion: &motion, inverse: &inverse, tolerance };
     workspace.collect(pair);
-    let QueryWorkspace {
-        walk,
-        ridges,
-        body: body_side,
-        obstacle: obstacle_side,
-        scratch,
-        contacts,
-        ..
-    } = workspace;
+    let QueryWorkspace { walk, ridges, body: body_side, obstacle: obstacle_side, scratch, contacts, .. } =
+        workspace;
     body_side.clear();
     obstacle_side.clear();
     ridges.clear(obstacle);
     let world_from_obstacle = Rigid::from_isometry(world_from_obstacle);
-    let mut sink = Sink {
-        pair,
-        world_from_obstacle,
-        contacts,
-        least: f64::INFINITY,
-    };
+    let mut sink = Sink { pair, world_from_obstacle, contacts, least: f64::INFINITY };
     vertices::of_body(pair, &walk.body, body_side, scratch, &mut sink);
     vertices::of_obstacle(pair, &walk.obstacle, obstacle_side, scratch, &mut sink);
-    ridges::find(
-        pair,
-        &walk.body,
-        [body_side, obstacle_side],
-        ridges,
-        scratch,
-        &mut sink,
-    );
+    ridges::find(pair, &walk.body, [body_side, obstacle_side], ridges, scratch, &mut sink);
     let min_distance = sink.least;
-    QueryResult {
-        min_distance,
-        contacts: &workspace.contacts,
-    }
+    QueryResult { min_distance, contacts: &workspace.contacts }
 }
 
 fn is_finite(pose: &Isometry3<f64>) -> bool {
-    pose.translation
-        .vector
-        .iter()
-        .chain(pose.rotation.coords.iter())
-        .all(|c| c.is_finite())
+    pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|c| c.is_finite())
 }

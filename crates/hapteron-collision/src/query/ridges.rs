@@ -147,21 +147,12 @@ pub(super) fn find(
 #[inline(always)]
 fn moved(surface: &Surface, edge: &Edge, index: u32, within: f64, motion: &Rigid) -> Ridge {
     let [a, b] = edge.vertices.map(|v| motion.point(surface.vertices[v as usize]));
-    Ridge {
-        start: a,
-        along: sub(b, a),
-        outward: motion.direction(edge.normal.map(f64::from)),
-        within,
-        index,
-    }
+    Ridge { start: a, along: sub(b, a), outward: motion.direction(edge.normal.map(f64::from)), within, index }
 }
 
 #[inline(always)]
 fn bounds(ridge: &Ridge) -> Box32 {
-    let mut result = Box32 {
-        min: [0.0; 3],
-        max: [0.0; 3],
-    };
+    let mut result = Box32 { min: [0.0; 3], max: [0.0; 3] };
     for axis in 0..3 {
         let (a, b) = (ridge.start[axis], ridge.start[axis] + ridge.along[axis]);
         let slack = 2e-7 * a.abs().max(b.abs()) as f32;
@@ -185,13 +176,7 @@ fn meet(pair: Pair<'_>, ridge: &Ridge, block: &RidgeBlock, crossing_squared: f64
         let lane = mask.trailing_zeros() as usize;
         mask &= mask - 1;
         let axis3 = |a: &[[f64; LANES]; 3]| [a[0][lane], a[1][lane], a[2][lane]];
-        if let Some(found) = judge(
-            pair,
-            ridge,
-            block.edge[lane],
-            axis3(&block.start),
-            axis3(&block.along),
-        ) {
+        if let Some(found) = judge(pair, ridge, block.edge[lane], axis3(&block.start), axis3(&block.along)) {
             sink.push(found);
         }
     }
@@ -223,18 +208,9 @@ fn judge(pair: Pair<'_>, ridge: &Ridge, other: u32, start: Vec3, along: Vec3) ->
     }
     let u = scale(between, 1.0 / distance);
     let (mine_cos, theirs_cos) = (dot(u, ridge.outward), -dot(u, their_outward));
-    let (mine_cone, theirs_cone) = (
-        f64::from(mine.cone) - CONE_SLACK,
-        f64::from(theirs.cone) - CONE_SLACK,
-    );
+    let (mine_cone, theirs_cone) = (f64::from(mine.cone) - CONE_SLACK, f64::from(theirs.cone) - CONE_SLACK);
     if mine_cos >= mine_cone && theirs_cos >= theirs_cone {
-        return Some(Found {
-            point_body: p,
-            point_obstacle: q,
-            normal: u,
-            depth: -distance,
-            features,
-        });
+        return Some(Found { point_body: p, point_obstacle: q, normal: u, depth: -distance, features });
     }
     let passed = mine.kind == EdgeKind::Convex
         && theirs.kind == EdgeKind::Convex
@@ -255,10 +231,7 @@ fn judge(pair: Pair<'_>, ridge: &Ridge, other: u32, start: Vec3, along: Vec3) ->
 fn faces_cross(pair: Pair<'_>, ridge: &Ridge, mine: &Edge, theirs: &Edge, start: Vec3, along: Vec3) -> bool {
     let corners =
         |surface: &Surface, t: u32| surface.triangles[t as usize].map(|v| surface.vertices[v as usize]);
-    theirs
-        .triangles
-        .iter()
-        .any(|&t| pierces(ridge.start, ridge.along, corners(pair.obstacle, t)))
+    theirs.triangles.iter().any(|&t| pierces(ridge.start, ridge.along, corners(pair.obstacle, t)))
         || mine
             .triangles
             .iter()

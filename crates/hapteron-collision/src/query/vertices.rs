@@ -41,9 +41,7 @@ pub(super) fn of_body(
         tolerance: pair.tolerance,
         slack: pair.slack() as f32,
     };
-    run(&search, side, scratch, |vertex, point, foot| {
-        push_body_vertex(pair, vertex, point, foot, sink)
-    });
+    run(&search, side, scratch, |vertex, point, foot| push_body_vertex(pair, vertex, point, foot, sink));
 }
 
 /// The same for the vertices of the obstacle.
@@ -63,9 +61,7 @@ pub(super) fn of_obstacle(
         tolerance: pair.tolerance,
         slack: pair.slack() as f32,
     };
-    run(&search, side, scratch, |vertex, _, foot| {
-        push_obstacle_vertex(pair, vertex, foot, sink)
-    });
+    run(&search, side, scratch, |vertex, _, foot| push_obstacle_vertex(pair, vertex, foot, sink));
 }
 
 #[inline(always)]
@@ -105,11 +101,7 @@ impl Nearest {
         let (squared, lane) = kernel::point_triangles(point, &surface.blocks[leaf as usize]);
         if squared < self.squared {
             let triangle = surface.leaves[leaf as usize].triangle(lane);
-            *self = Self {
-                squared,
-                triangle,
-                leaf,
-            };
+            *self = Self { squared, triangle, leaf };
         }
     }
 }
@@ -124,11 +116,8 @@ fn nearest_triangle(
     bounds: &[LeafBounds],
     last: &mut u32,
 ) -> u32 {
-    let mut nearest = Nearest {
-        squared: search.tolerance * search.tolerance,
-        triangle: NOWHERE,
-        leaf: NOWHERE,
-    };
+    let mut nearest =
+        Nearest { squared: search.tolerance * search.tolerance, triangle: NOWHERE, leaf: NOWHERE };
     let mut first = *last;
     if first != NOWHERE {
         nearest.look(search.other, first, point);
@@ -137,11 +126,8 @@ fn nearest_triangle(
     for (eight, bounds) in near.chunks(LANES).zip(bounds) {
         let (lower, mut mask) = bounds.lower(point32, search.slack, nearest.squared as f32 * (1.0 + 1e-6));
         // Without a first guess begin with the closest box: its triangles usually rule out the others.
-        let mut lane = if first == NOWHERE {
-            kernel::first_least32(&lower)
-        } else {
-            mask.trailing_zeros() as usize
-        };
+        let mut lane =
+            if first == NOWHERE { kernel::first_least32(&lower) } else { mask.trailing_zeros() as usize };
         while mask != 0 {
             mask &= !(1 << lane);
             if f64::from(lower[lane]) < nearest.squared * (1.0 + 1e-6) && eight[lane] != first {
@@ -149,11 +135,7 @@ fn nearest_triangle(
             }
             lane = mask.trailing_zeros() as usize;
         }
-        first = if nearest.leaf != NOWHERE && first == NOWHERE {
-            nearest.leaf
-        } else {
-            first
-        };
+        first = if nearest.leaf != NOWHERE && first == NOWHERE { nearest.leaf } else { first };
     }
     *last = nearest.leaf;
     nearest.triangle
@@ -165,12 +147,7 @@ pub(super) fn push_body_vertex(pair: Pair<'_>, vertex: u32, point: Vec3, foot: &
     sink.least = sink.least.min(foot.signed_distance);
     let normal = scale(foot.normal, -1.0);
     let own = &pair.body.vertex_normals[vertex as usize];
-    if !faces(
-        own,
-        pair.motion.direction(own.normal.map(f64::from)),
-        normal,
-        foot.signed_distance,
-    ) {
+    if !faces(own, pair.motion.direction(own.normal.map(f64::from)), normal, foot.signed_distance) {
         return;
     }
     sink.push(Found {
@@ -188,12 +165,7 @@ pub(super) fn push_obstacle_vertex(pair: Pair<'_>, vertex: u32, foot: &Foot, sin
     sink.least = sink.least.min(foot.signed_distance);
     let normal = pair.motion.direction(foot.normal);
     let own = &pair.obstacle.vertex_normals[vertex as usize];
-    if !faces(
-        own,
-        own.normal.map(f64::from),
-        scale(normal, -1.0),
-        foot.signed_distance,
-    ) {
+    if !faces(own, own.normal.map(f64::from), scale(normal, -1.0), foot.signed_distance) {
         return;
     }
     sink.push(Found {
@@ -210,10 +182,5 @@ pub(super) fn push_obstacle_vertex(pair: Pair<'_>, vertex: u32, foot: &Foot, sin
 #[inline(always)]
 fn faces(vertex: &VertexNormal, normal: Vec3, direction: Vec3, signed_distance: f64) -> bool {
     let cone = f64::from(vertex.cone);
-    dot(normal, direction)
-        >= if signed_distance <= 0.0 {
-            cone.min(0.0)
-        } else {
-            cone
-        }
+    dot(normal, direction) >= if signed_distance <= 0.0 { cone.min(0.0) } else { cone }
 }

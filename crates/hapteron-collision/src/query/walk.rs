@@ -52,11 +52,7 @@ pub(super) fn walk(pair: Pair<'_>, reach: f64, walk: &mut Walk) {
     let margin = (reach + pair.slack()) as f32;
     let mut block = TriangleBlock::ZERO;
     walk.candidates.push(0);
-    walk.stack.push(Frame {
-        node: 0,
-        begin: 0,
-        end: 1,
-    });
+    walk.stack.push(Frame { node: 0, begin: 0, end: 1 });
     while let Some(frame) = walk.stack.pop() {
         walk.candidates.truncate(frame.end as usize);
         let node = &pair.body.nodes[frame.node as usize];
@@ -73,11 +69,7 @@ pub(super) fn walk(pair: Pair<'_>, reach: f64, walk: &mut Walk) {
                 continue;
             }
             if child & LEAF == 0 {
-                walk.stack.push(Frame {
-                    node: child,
-                    begin,
-                    end,
-                });
+                walk.stack.push(Frame { node: child, begin, end });
             } else {
                 meet_leaf(pair, walk, child & !LEAF, begin as usize, margin, &mut block);
                 walk.candidates.truncate(begin as usize);
@@ -121,9 +113,7 @@ fn refine(obstacle: &Surface, walk: &mut Walk, frame: Frame, b: &Box32, to_leave
 
 #[inline(always)]
 fn child_extent(node: &Node, lane: usize) -> f32 {
-    (0..3)
-        .map(|k| (node.max[k][lane] - node.min[k][lane]) * (node.max[k][lane] - node.min[k][lane]))
-        .sum()
+    (0..3).map(|k| (node.max[k][lane] - node.min[k][lane]) * (node.max[k][lane] - node.min[k][lane])).sum()
 }
 
 /// Keeps the candidates that may come within the margin of a leaf of the body.
@@ -153,23 +143,14 @@ fn meet_leaf(
     }
     let end = walk.body.near.len() as u32;
     if first != end {
-        walk.body.of.push(Neighbourhood {
-            leaf: index,
-            begin: first,
-            end,
-        });
+        walk.body.of.push(Neighbourhood { leaf: index, begin: first, end });
     }
 }
 
 /// The same pairs by leaf of the obstacle, in the order of its leaves.
 #[inline(always)]
 fn invert(walk: &mut Walk, leaves: usize) {
-    let Walk {
-        counts,
-        body,
-        obstacle,
-        ..
-    } = walk;
+    let Walk { counts, body, obstacle, .. } = walk;
     counts.clear();
     counts.resize(leaves + 1, 0);
     for &other in &body.near {
@@ -180,11 +161,7 @@ fn invert(walk: &mut Walk, leaves: usize) {
         let (begin, count) = (counts[leaf], counts[leaf + 1]);
         counts[leaf + 1] += begin;
         if count > 0 {
-            obstacle.of.push(Neighbourhood {
-                leaf: leaf as u32,
-                begin,
-                end: begin + count,
-            });
+            obstacle.of.push(Neighbourhood { leaf: leaf as u32, begin, end: begin + count });
         }
     }
     obstacle.near.clear();
@@ -208,22 +185,14 @@ struct Slab {
 impl Slab {
     #[inline(always)]
     fn of_own(leaf: &Leaf) -> Self {
-        Self {
-            normal: leaf.normal,
-            low: leaf.low,
-            high: leaf.high,
-        }
+        Self { normal: leaf.normal, low: leaf.low, high: leaf.high }
     }
 
     #[inline(always)]
     fn of(leaf: &Leaf, motion: &Rigid) -> Self {
         let normal = motion.direction(leaf.normal.map(f64::from));
         let shift = crate::vector::dot(normal, motion.translation) as f32;
-        Self {
-            normal: normal.map(|c| c as f32),
-            low: leaf.low + shift,
-            high: leaf.high + shift,
-        }
+        Self { normal: normal.map(|c| c as f32), low: leaf.low + shift, high: leaf.high + shift }
     }
 
     /// True when the box is farther than `margin` from the slab.
@@ -242,10 +211,7 @@ impl Slab {
 /// The box around a block, grown by `margin` and then rounded outward.
 #[inline(always)]
 fn block_box(block: &TriangleBlock, margin: f32) -> Box32 {
-    let mut result = Box32 {
-        min: [0.0; 3],
-        max: [0.0; 3],
-    };
+    let mut result = Box32 { min: [0.0; 3], max: [0.0; 3] };
     for axis in 0..3 {
         let mut low = [0.0; LANES];
         let mut high = [0.0; LANES];
@@ -256,9 +222,7 @@ fn block_box(block: &TriangleBlock, margin: f32) -> Box32 {
             high[l] = c + if b > 0.0 { b } else { 0.0 };
         }
         let low = low.iter().fold(f64::INFINITY, |m, &v| if v < m { v } else { m });
-        let high = high
-            .iter()
-            .fold(f64::NEG_INFINITY, |m, &v| if v > m { v } else { m });
+        let high = high.iter().fold(f64::NEG_INFINITY, |m, &v| if v > m { v } else { m });
         result.min[axis] = low as f32 - margin;
         result.max[axis] = high as f32 + margin;
     }
@@ -278,11 +242,7 @@ pub(super) fn displacement(root: &Node, from: &Rigid, to: &Rigid) -> f64 {
     (0..8)
         .map(|corner| {
             let at = |axis: usize| {
-                if corner >> axis & 1 == 0 {
-                    low[axis]
-                } else {
-                    high[axis]
-                }
+                if corner >> axis & 1 == 0 { low[axis] } else { high[axis] }
             };
             let p: Vec3 = [at(0), at(1), at(2)];
             norm(crate::vector::sub(to.point(p), from.point(p)))

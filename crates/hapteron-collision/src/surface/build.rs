@@ -12,10 +12,7 @@ struct Bounds {
 }
 
 impl Bounds {
-    const NONE: Self = Self {
-        min: [f64::INFINITY; 3],
-        max: [f64::NEG_INFINITY; 3],
-    };
+    const NONE: Self = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
 
     fn grow(&mut self, other: &Self) {
         for k in 0..3 {
@@ -26,11 +23,7 @@ impl Bounds {
 
     fn half_area(&self) -> f64 {
         let e = sub(self.max, self.min);
-        if e[0] < 0.0 {
-            0.0
-        } else {
-            e[0] * e[1] + e[1] * e[2] + e[2] * e[0]
-        }
+        if e[0] < 0.0 { 0.0 } else { e[0] * e[1] + e[1] * e[2] + e[2] * e[0] }
     }
 }
 
@@ -55,15 +48,8 @@ pub(super) fn surface(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Surface {
     let vertex_normals = topology::vertex_normals(&vertices, &triangles, &normals, &edges);
     let radius = vertices.iter().map(|&v| norm(v)).fold(0.0, f64::max);
 
-    let boxes = triangles
-        .iter()
-        .map(|t| bounds_of(&t.map(|v| vertices[v as usize])))
-        .collect();
-    let mut builder = Builder {
-        boxes,
-        order: (0..triangles.len() as u32).collect(),
-        branches: Vec::new(),
-    };
+    let boxes = triangles.iter().map(|t| bounds_of(&t.map(|v| vertices[v as usize]))).collect();
+    let mut builder = Builder { boxes, order: (0..triangles.len() as u32).collect(), branches: Vec::new() };
     if !triangles.is_empty() {
         builder.split(0, triangles.len());
     }
@@ -91,9 +77,7 @@ fn digest(surface: &Surface) -> u64 {
     let indices = surface.triangles.iter().flatten().map(|&i| u64::from(i));
     coordinates
         .chain(indices)
-        .fold(0xcbf2_9ce4_8422_2325, |hash, word| {
-            (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3)
-        })
+        .fold(0xcbf2_9ce4_8422_2325, |hash, word| (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
 fn bounds_of(corners: &[Vec3]) -> Bounds {
@@ -108,12 +92,7 @@ impl Builder {
     fn split(&mut self, begin: usize, end: usize) -> usize {
         let bounds = self.bounds(begin, end);
         let index = self.branches.len();
-        self.branches.push(Branch {
-            bounds,
-            begin,
-            end,
-            children: None,
-        });
+        self.branches.push(Branch { bounds, begin, end, children: None });
         if end - begin > LANES {
             let middle = self.partition(begin, end);
             let left = self.split(begin, middle);
@@ -141,11 +120,7 @@ impl Builder {
         /// Above this the split is sought among a few positions only.
         const DENSE: usize = 1024;
         let count = end - begin;
-        let step = if count > DENSE {
-            (count / 32).next_multiple_of(LANES)
-        } else {
-            LANES
-        };
+        let step = if count > DENSE { (count / 32).next_multiple_of(LANES) } else { LANES };
         let mut best = (f64::INFINITY, 0, step);
         for axis in 0..3 {
             self.sort(begin, end, axis);
@@ -176,11 +151,7 @@ impl Builder {
 
     fn sort(&mut self, begin: usize, end: usize, axis: usize) {
         let mut part = self.order[begin..end].to_vec();
-        part.sort_unstable_by(|&a, &b| {
-            self.center(a, axis)
-                .total_cmp(&self.center(b, axis))
-                .then(a.cmp(&b))
-        });
+        part.sort_unstable_by(|&a, &b| self.center(a, axis).total_cmp(&self.center(b, axis)).then(a.cmp(&b)));
         self.order[begin..end].copy_from_slice(&part);
     }
 }
@@ -195,16 +166,8 @@ fn renumber(surface: &mut Surface, builder: &Builder) {
         let own = &builder.order[branch.begin..branch.end];
         let (first_vertex, first_edge) = (vertex_order.len(), edge_order.len());
         for &t in own {
-            take(
-                &surface.triangles[t as usize],
-                &mut vertex_taken,
-                &mut vertex_order,
-            );
-            take(
-                &surface.triangle_edges[t as usize],
-                &mut edge_taken,
-                &mut edge_order,
-            );
+            take(&surface.triangles[t as usize], &mut vertex_taken, &mut vertex_order);
+            take(&surface.triangle_edges[t as usize], &mut edge_taken, &mut edge_order);
         }
         let ridge = |e: u32| surface.edges[e as usize].kind != EdgeKind::Hollow;
         edge_order[first_edge..].sort_by_key(|&e| !ridge(e));
@@ -237,10 +200,7 @@ fn renumber(surface: &mut Surface, builder: &Builder) {
     for t in &mut surface.triangle_edges {
         *t = t.map(|e| new_edge[e as usize]);
     }
-    for Edge {
-        vertices, triangles, ..
-    } in &mut surface.edges
-    {
+    for Edge { vertices, triangles, .. } in &mut surface.edges {
         *vertices = vertices.map(|v| new_vertex[v as usize]);
         *triangles = triangles.map(|t| new_triangle[t as usize]);
     }
@@ -256,13 +216,9 @@ fn slab(surface: &Surface, triangles: &[u32]) -> ([f32; 3], f32, f32) {
     });
     // Heights are taken along the normal as stored, so that rounding it costs nothing.
     let normal = unit_or_zero(sum).map(|c| c as f32);
-    let heights = triangles
-        .iter()
-        .flat_map(|&t| corners(t))
-        .map(|v| dot(v, normal.map(f64::from)));
-    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| {
-        (low.min(h), high.max(h))
-    });
+    let heights = triangles.iter().flat_map(|&t| corners(t)).map(|v| dot(v, normal.map(f64::from)));
+    let (low, high) =
+        heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
     (normal, below(low), above(high))
 }
 
@@ -325,11 +281,7 @@ fn collapse_from(root: usize, branches: &[Branch], leaf_index: &[u32], nodes: &m
         let largest = open
             .iter()
             .enumerate()
-            .filter_map(|(i, &b)| {
-                branches[b]
-                    .children
-                    .map(|c| (branches[b].bounds.half_area(), i, c))
-            })
+            .filter_map(|(i, &b)| branches[b].children.map(|c| (branches[b].bounds.half_area(), i, c)))
             .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
         let Some((_, position, [left, right])) = largest else {
             break;
@@ -361,19 +313,11 @@ fn collapse_from(root: usize, branches: &[Branch], leaf_index: &[u32], nodes: &m
 /// The nearest single-precision number that is not above `value`.
 fn below(value: f64) -> f32 {
     let rounded = value as f32;
-    if f64::from(rounded) > value {
-        rounded.next_down()
-    } else {
-        rounded
-    }
+    if f64::from(rounded) > value { rounded.next_down() } else { rounded }
 }
 
 /// The nearest single-precision number that is not below `value`.
 fn above(value: f64) -> f32 {
     let rounded = value as f32;
-    if f64::from(rounded) < value {
-        rounded.next_up()
-    } else {
-        rounded
-    }
+    if f64::from(rounded) < value { rounded.next_up() } else { rounded }
 }

@@ -63,11 +63,8 @@ pub(crate) struct TriangleBlock {
 }
 
 impl TriangleBlock {
-    pub(crate) const ZERO: Self = Self {
-        corner: [[0.0; LANES]; 3],
-        edge1: [[0.0; LANES]; 3],
-        edge2: [[0.0; LANES]; 3],
-    };
+    pub(crate) const ZERO: Self =
+        Self { corner: [[0.0; LANES]; 3], edge1: [[0.0; LANES]; 3], edge2: [[0.0; LANES]; 3] };
 }
 
 /// One leaf: a block of triangles with the vertices and edges that it owns (each belongs to one leaf).
@@ -92,12 +89,7 @@ impl Leaf {
     /// The triangle in a lane of the leaf's block.
     #[inline(always)]
     pub(crate) fn triangle(&self, lane: usize) -> u32 {
-        self.first_triangle
-            + if lane < usize::from(self.triangles) {
-                lane as u32
-            } else {
-                0
-            }
+        self.first_triangle + if lane < usize::from(self.triangles) { lane as u32 } else { 0 }
     }
 }
 

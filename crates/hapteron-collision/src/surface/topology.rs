@@ -90,9 +90,7 @@ fn edge(
     faces: &[([u32; 2], u32, u8)],
 ) -> Edge {
     let from = |face: &([u32; 2], u32, u8)| triangles[face.1 as usize][face.2 as usize];
-    let sum = faces
-        .iter()
-        .fold([0.0; 3], |sum, f| add(sum, normals[f.1 as usize]));
+    let sum = faces.iter().fold([0.0; 3], |sum, f| add(sum, normals[f.1 as usize]));
     let mean = unit_or_zero(sum);
     let first = faces[0].1;
     let (kind, normal, cone, second) = match faces {
@@ -108,11 +106,7 @@ fn edge(
             let third = triangles[b.1 as usize][(b.2 as usize + 2) % 3];
             let beyond = dot(n, sub(vertices[third as usize], vertices[ends[0] as usize]));
             let bend = 1.0 - dot(n, m);
-            let kind = if beyond < 0.0 && bend > FLAT {
-                EdgeKind::Convex
-            } else {
-                EdgeKind::Hollow
-            };
+            let kind = if beyond < 0.0 && bend > FLAT { EdgeKind::Convex } else { EdgeKind::Hollow };
             (kind, mean, ((1.0 + dot(n, m)).max(0.0) / 2.0).sqrt(), b.1)
         }
         _ => (EdgeKind::Unoriented, mean, -1.0, faces[1].1),
@@ -157,21 +151,11 @@ pub(super) fn vertex_normals(
         .zip(&cones)
         .map(|(sum, &cone)| {
             let half = libm::acos(cone.clamp(-1.0, 1.0)) + CONE_MARGIN;
-            let cone = if half >= core::f64::consts::PI {
-                -1.0
-            } else {
-                libm::cos(half)
-            };
-            VertexNormal {
-                normal: sum.map(|c| c as f32),
-                cone: cone as f32,
-            }
+            let cone = if half >= core::f64::consts::PI { -1.0 } else { libm::cos(half) };
+            VertexNormal { normal: sum.map(|c| c as f32), cone: cone as f32 }
         })
         .collect();
-    for edge in edges
-        .iter()
-        .filter(|e| matches!(e.kind, EdgeKind::Boundary | EdgeKind::Unoriented))
-    {
+    for edge in edges.iter().filter(|e| matches!(e.kind, EdgeKind::Boundary | EdgeKind::Unoriented)) {
         for v in edge.vertices {
             result[v as usize].cone = VertexNormal::OPEN;
         }

@@ -41,9 +41,7 @@ impl System {
     fn at(problem: &Problem<'_>, state: &State, end: Option<&Change>) -> Self {
         let motion = Motion::of(state, problem.body);
         let mut sum = Linearization::zero();
-        problem
-            .coupling
-            .linearize(problem.handle, state, &motion.v, &motion.omega, &mut sum);
+        problem.coupling.linearize(problem.handle, state, &motion.v, &motion.omega, &mut sum);
         let mut signature = 0;
         if let ContactForce::Planes(planes) = problem.contact {
             signature = add_planes(planes, state, &motion, end, &mut sum);
@@ -77,11 +75,7 @@ impl System {
 
     /// dt f.
     fn explicit_residual(&self, dt: f64) -> Residual {
-        Residual {
-            position: self.motion.v * dt,
-            orientation: self.rate * dt,
-            momentum: self.wrench * dt,
-        }
+        Residual { position: self.motion.v * dt, orientation: self.rate * dt, momentum: self.wrench * dt }
     }
 
     /// Solves (I - dt J) dy = residual, condensed to the six momenta (method H.5); exact.
@@ -101,8 +95,7 @@ impl System {
         let momentum = solve6(a, rhs)?;
         let (p, l) = (momentum.fixed_rows::<3>(0), momentum.fixed_rows::<3>(3));
         let mut y = SVector::<f64, 13>::zeros();
-        y.fixed_rows_mut::<3>(0)
-            .copy_from(&(residual.position + p * to_position));
+        y.fixed_rows_mut::<3>(0).copy_from(&(residual.position + p * to_position));
         y.fixed_rows_mut::<4>(3).copy_from(&(free + along * l));
         y.fixed_rows_mut::<6>(7).copy_from(&momentum);
         Some(y)
@@ -111,8 +104,7 @@ impl System {
     /// The same by Gaussian elimination of the whole matrix of Eq. 6.
     fn solve_dense(&self, residual: &Residual, dt: f64) -> Option<SVector<f64, 13>> {
         let mut j = SMatrix::<f64, 13, 13>::zeros();
-        j.fixed_view_mut::<3, 3>(0, 7)
-            .fill_diagonal(self.motion.inverse_mass);
+        j.fixed_view_mut::<3, 3>(0, 7).fill_diagonal(self.motion.inverse_mass);
         j.fixed_view_mut::<4, 4>(3, 3).copy_from(&self.rate_by_q);
         j.fixed_view_mut::<4, 3>(3, 10).copy_from(&self.rate_by_l);
         j.fixed_view_mut::<6, 13>(7, 0).copy_from(&self.jacobian);
@@ -128,14 +120,8 @@ impl System {
         let turn = self.motion.turn_by_q * dy.fixed_rows::<4>(3);
         let v = dy.fixed_rows::<3>(7) * self.motion.inverse_mass;
         let omega = self.motion.omega_by_turn * turn + self.motion.inverse_inertia_w * dy.fixed_rows::<3>(10);
-        let mut change = Change {
-            position: Vector6::zeros(),
-            velocity: Vector6::zeros(),
-        };
-        change
-            .position
-            .fixed_rows_mut::<3>(0)
-            .copy_from(&dy.fixed_rows::<3>(0));
+        let mut change = Change { position: Vector6::zeros(), velocity: Vector6::zeros() };
+        change.position.fixed_rows_mut::<3>(0).copy_from(&dy.fixed_rows::<3>(0));
         change.position.fixed_rows_mut::<3>(3).copy_from(&turn);
         change.velocity.fixed_rows_mut::<3>(0).copy_from(&v);
         change.velocity.fixed_rows_mut::<3>(3).copy_from(&omega);
@@ -206,10 +192,7 @@ pub(super) fn newton_step(problem: &Problem<'_>, state: &State, dt: f64) -> Opti
         };
         let dy = system.solve(&residual, dt)?;
         y += dy;
-        let small = dy
-            .iter()
-            .zip(y.iter())
-            .all(|(d, v)| d.abs() <= NEWTON_TOLERANCE * (v.abs() + 1e-6));
+        let small = dy.iter().zip(y.iter()).all(|(d, v)| d.abs() <= NEWTON_TOLERANCE * (v.abs() + 1e-6));
         if iteration > 0 && small {
             break;
         }

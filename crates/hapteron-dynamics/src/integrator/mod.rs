@@ -52,9 +52,7 @@ impl Problem<'_> {
     pub fn rate(&self, state: &State) -> SVector<f64, 13> {
         let motion = Motion::of(state, self.body);
         let inverse_inertia_b = self.body.inverse_inertia_b();
-        let coupling = self
-            .coupling
-            .wrench(self.handle, state, motion.inverse_mass, inverse_inertia_b);
+        let coupling = self.coupling.wrench(self.handle, state, motion.inverse_mass, inverse_inertia_b);
         let contact = self.contact.wrench(state, self.body);
         let sum = coupling + contact;
         let rate = State {
@@ -118,15 +116,7 @@ pub fn step(problem: &Problem<'_>, state: &State, dt: f64, method: Method) -> St
 
 fn failed(state: &State, status: Status) -> Step {
     let zero = Wrench::zero();
-    Step {
-        state: *state,
-        coupling: zero,
-        feedback: zero,
-        contact: zero,
-        deviation: 0.0,
-        angle: 0.0,
-        status,
-    }
+    Step { state: *state, coupling: zero, feedback: zero, contact: zero, deviation: 0.0, angle: 0.0, status }
 }
 
 /// Renormalises the quaternion and evaluates the wrenches at the new state.
@@ -137,12 +127,8 @@ fn finish(problem: &Problem<'_>, before: &State, mut state: State) -> Step {
     }
     state.orientation /= length;
     let body = problem.body;
-    let coupling = problem.coupling.wrench(
-        problem.handle,
-        &state,
-        1.0 / body.mass(),
-        body.inverse_inertia_b(),
-    );
+    let coupling =
+        problem.coupling.wrench(problem.handle, &state, 1.0 / body.mass(), body.inverse_inertia_b());
     let (feedback, deviation, angle) = problem.coupling.feedback(problem.handle, &state, body);
     let (feedback, limited) = problem.coupling.limited(feedback);
     let contact = problem.contact.wrench(&state, body);
@@ -152,23 +138,12 @@ fn finish(problem: &Problem<'_>, before: &State, mut state: State) -> Step {
     let mut status = Status::NONE;
     for (bit, set) in [
         (Status::COUPLING_ANGLE_LIMIT, angle > ANGLE_LIMIT),
-        (
-            Status::COUPLING_SATURATED,
-            problem.coupling.is_saturated(deviation, angle),
-        ),
+        (Status::COUPLING_SATURATED, problem.coupling.is_saturated(deviation, angle)),
         (Status::FEEDBACK_LIMITED, limited),
     ] {
         if set {
             status = status.with(bit);
         }
     }
-    Step {
-        state,
-        coupling,
-        feedback,
-        contact,
-        deviation,
-        angle,
-        status,
-    }
+    Step { state, coupling, feedback, contact, deviation, angle, status }
 }

@@ -23,9 +23,7 @@ pub(super) fn step(problem: &Problem<'_>, state: &State) -> Option<State> {
     handle.angular_velocity = Vector3::zeros();
     let motion = Motion::of(&resting, problem.body);
     let mut sum = Linearization::zero();
-    problem
-        .coupling
-        .linearize(&handle, &resting, &motion.v, &motion.omega, &mut sum);
+    problem.coupling.linearize(&handle, &resting, &motion.v, &motion.omega, &mut sum);
     match problem.contact {
         ContactForce::None => {}
         ContactForce::Planes(planes) => {
@@ -34,11 +32,7 @@ pub(super) fn step(problem: &Problem<'_>, state: &State) -> Option<State> {
         ContactForce::Linearized(model) | ContactForce::Held(model) => {
             let j = model.jacobian_at(&resting);
             let held = matches!(problem.contact, ContactForce::Held(_));
-            sum.wrench += if held {
-                model.wrench
-            } else {
-                model.wrench_at(&resting)
-            };
+            sum.wrench += if held { model.wrench } else { model.wrench_at(&resting) };
             let mut left = sum.by_position.fixed_columns_mut::<3>(0);
             left += j.fixed_columns::<3>(0);
             // A turn changes q by Q times the turn.
@@ -49,10 +43,7 @@ pub(super) fn step(problem: &Problem<'_>, state: &State) -> Option<State> {
     }
     let weight = problem.gravity * problem.body.mass();
     sum.wrench += Vector6::new(weight.x, weight.y, weight.z, 0.0, 0.0, 0.0);
-    let (k, k_turn) = (
-        problem.coupling.linear_stiffness(),
-        problem.coupling.angular_stiffness(),
-    );
+    let (k, k_turn) = (problem.coupling.linear_stiffness(), problem.coupling.angular_stiffness());
     let regular = Vector6::new(k, k, k, k_turn, k_turn, k_turn) * REGULARISATION;
     let stiffness = Matrix6::from_diagonal(&regular) - sum.by_position;
     let change = stiffness.lu().solve(&sum.wrench)?;

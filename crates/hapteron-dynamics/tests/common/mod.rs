@@ -50,13 +50,7 @@ impl Random {
             self.turn(3.1)
         };
         let spin = self.scale(0.01, 100.0);
-        State::moving(
-            body,
-            self.vector(0.1),
-            &turn,
-            &self.vector(1.0),
-            &self.vector(spin),
-        )
+        State::moving(body, self.vector(0.1), &turn, &self.vector(1.0), &self.vector(spin))
     }
 
     /// A handle near the body, turned against it by at most 2.9 rad.
@@ -70,14 +64,10 @@ impl Random {
     }
 
     pub fn coupling(&mut self, saturating: bool) -> Coupling {
-        let linear = Spring {
-            stiffness: self.scale(10.0, 1e4),
-            limit: saturating.then(|| self.scale(0.5, 50.0)),
-        };
-        let angular = Spring {
-            stiffness: self.scale(0.01, 10.0),
-            limit: saturating.then(|| self.scale(0.01, 1.0)),
-        };
+        let linear =
+            Spring { stiffness: self.scale(10.0, 1e4), limit: saturating.then(|| self.scale(0.5, 50.0)) };
+        let angular =
+            Spring { stiffness: self.scale(0.01, 10.0), limit: saturating.then(|| self.scale(0.01, 1.0)) };
         let (b, b_turn) = (self.scale(0.1, 20.0), self.scale(1e-3, 0.1));
         // Coupling frames far from the body's, so that the angle is not small.
         Coupling::new(linear, b, angular, b_turn, self.vector(0.1), self.turn(0.9)).unwrap()

@@ -55,15 +55,11 @@ pub const OPENING: Opening = {
 /// Generates the mug in metres: its axis along z, its foot on z = 0, its handle towards positive x.
 pub(crate) fn generate() -> Shape {
     let mut shape = Shape::default();
-    let rings: Vec<Vec<u32>> = profile()
-        .iter()
-        .map(|&[radius, z]| ring(&mut shape, radius, z, AROUND))
-        .collect();
+    let rings: Vec<Vec<u32>> =
+        profile().iter().map(|&[radius, z]| ring(&mut shape, radius, z, AROUND)).collect();
     let windows = window_rows();
     for (row, pair) in rings.windows(2).enumerate() {
-        let cut = windows
-            .iter()
-            .any(|&start| (start..start + WINDOW.1).contains(&row));
+        let cut = windows.iter().any(|&start| (start..start + WINDOW.1).contains(&row));
         for k in 0..AROUND {
             let from_handle = (k + WINDOW.0) % AROUND;
             if cut && from_handle < 2 * WINDOW.0 {
@@ -94,19 +90,15 @@ fn outer_radius(z: f64) -> f64 {
 /// Rows (radius, height) from the foot up the outer wall, over the rim and down the inner wall.
 fn profile() -> Vec<[f64; 2]> {
     let mut rows = vec![[36.0, 1.2], [38.5, 0.0], [41.5, 0.4], [43.6, 2.6]];
-    for z in [
-        8.5, 16.5, 25.0, 31.0, 37.0, 43.0, 49.5, 56.0, 62.5, 69.0, 75.0, 81.0, 87.0, 93.0, 99.0, 104.5,
-    ] {
+    for z in [8.5, 16.5, 25.0, 31.0, 37.0, 43.0, 49.5, 56.0, 62.5, 69.0, 75.0, 81.0, 87.0, 93.0, 99.0, 104.5]
+    {
         rows.push([outer_radius(z), z]);
     }
     let rim = outer_radius(HEIGHT) - 0.5 * WALL;
     for degrees in [10.0, 50.0, 90.0, 130.0, 170.0] {
         let angle: f64 = degrees * core::f64::consts::PI / 180.0;
         let half = 0.5 * WALL;
-        rows.push([
-            rim + half * libm::cos(angle),
-            HEIGHT - half + half * libm::sin(angle),
-        ]);
+        rows.push([rim + half * libm::cos(angle), HEIGHT - half + half * libm::sin(angle)]);
     }
     for z in [97.0, 80.0, 62.0, 44.0, 27.0, 13.0] {
         rows.push([outer_radius(z) - WALL, z]);
@@ -119,9 +111,7 @@ fn profile() -> Vec<[f64; 2]> {
 fn window_rows() -> [usize; 2] {
     let rows = profile();
     [OPENING_HEIGHT - ARM, OPENING_HEIGHT + ARM].map(|middle| {
-        let row = rows
-            .iter()
-            .position(|&[radius, z]| radius > 40.0 && (z - middle).abs() < 1e-9);
+        let row = rows.iter().position(|&[radius, z]| radius > 40.0 && (z - middle).abs() < 1e-9);
         row.unwrap_or(WINDOW.1) - WINDOW.1 / 2
     })
 }
@@ -153,12 +143,7 @@ fn cap(shape: &mut Shape, outer: &[u32], side: f64) {
     let middle = if side < 0.0 { 1.6 } else { WALL };
     let mut previous = outer.to_vec();
     for (count, share) in [(24, 0.66), (12, 0.33)] {
-        let mut inner = ring(
-            shape,
-            start * share,
-            middle + (height - middle) * share * share * share,
-            count,
-        );
+        let mut inner = ring(shape, start * share, middle + (height - middle) * share * share * share, count);
         if side < 0.0 {
             inner = reversed_from_start(&inner);
         }
@@ -223,11 +208,7 @@ fn path_length(start: f64) -> f64 {
 fn path(start: f64, travelled: f64) -> (Point, Point) {
     let whole = path_length(start);
     // The line is symmetric about the height of the opening.
-    let (lower, sign) = if travelled > 0.5 * whole {
-        (whole - travelled, 1.0)
-    } else {
-        (travelled, -1.0)
-    };
+    let (lower, sign) = if travelled > 0.5 * whole { (whole - travelled, 1.0) } else { (travelled, -1.0) };
     let arm = GRIP - BEND - start;
     let quarter = 0.5 * core::f64::consts::PI * BEND;
     let (x, z, out_x, out_z) = if lower < arm {

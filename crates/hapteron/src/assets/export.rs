@@ -12,10 +12,7 @@ use hapteron_collision::mesh::TriMesh;
 /// Those of the writer.
 pub fn write_obj(mesh: &TriMesh, name: &str, mut output: impl Write) -> io::Result<()> {
     // A line break in the name would become a line of the file.
-    let name: String = name
-        .chars()
-        .map(|c| if c.is_control() { ' ' } else { c })
-        .collect();
+    let name: String = name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     writeln!(output, "# {name}: {} triangles, metres", mesh.triangles().len())?;
     writeln!(output, "o {name}")?;
     for [x, y, z] in mesh.vertices() {
@@ -60,9 +57,5 @@ fn unit_normal(corners: [[f64; 3]; 3]) -> [f64; 3] {
     let [a, b, c] = corners;
     let normal = super::shape::cross(super::shape::subtract(b, a), super::shape::subtract(c, a));
     let length = super::shape::length(normal);
-    if length > 0.0 {
-        normal.map(|x| x / length)
-    } else {
-        [0.0; 3]
-    }
+    if length > 0.0 { normal.map(|x| x / length) } else { [0.0; 3] }
 }

@@ -51,13 +51,9 @@ pub enum AssetError {
 /// # Errors
 /// A name that is not among [`BUILTIN_NAMES`].
 pub fn builtin(name: &str) -> Result<TriMesh, AssetError> {
-    let shape = generate(name).ok_or_else(|| AssetError::UnknownName {
-        name: name.to_owned(),
-    })?;
-    TriMesh::new(shape.vertices, shape.triangles).map_err(|problem| AssetError::Faulty {
-        name: name.to_owned(),
-        problem,
-    })
+    let shape = generate(name).ok_or_else(|| AssetError::UnknownName { name: name.to_owned() })?;
+    TriMesh::new(shape.vertices, shape.triangles)
+        .map_err(|problem| AssetError::Faulty { name: name.to_owned(), problem })
 }
 
 /// The triangles of a model before they are checked.

@@ -143,11 +143,7 @@ pub(crate) fn dot(a: Point, b: Point) -> f64 {
 
 /// Vector product.
 pub(crate) fn cross(a: Point, b: Point) -> Point {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Euclidean length; the square root is exact by IEEE 754, so it is the same on every machine.

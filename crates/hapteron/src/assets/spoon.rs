@@ -79,11 +79,7 @@ impl Section {
         let rounding = 1.3 * end;
         let to_end = ((x - (LENGTH - rounding)) / rounding).clamp(0.0, 1.0);
         let handle = (neck + (end - neck) * smooth_step((x - 70.0) / 120.0)) * (1.0 - to_end * to_end).sqrt();
-        let half_width = if x > half_length {
-            smooth_maximum(bowl, handle, 3.5)
-        } else {
-            bowl
-        };
+        let half_width = if x > half_length { smooth_maximum(bowl, handle, 3.5) } else { bowl };
         let handle_share = smooth_step((x - 40.0) / 50.0);
         let beyond = ((x - ARCH[1]) / (LENGTH - ARCH[1])).clamp(0.0, 1.0);
         Self {
@@ -100,11 +96,7 @@ impl Section {
         let quarter = AROUND / 4;
         let fold = (k % (2 * quarter)).min(2 * quarter - k % (2 * quarter));
         let magnitude = ACROSS[0][fold] + (ACROSS[1][fold] - ACROSS[0][fold]) * self.handle_share;
-        let across = if k > quarter && k < 3 * quarter {
-            -magnitude
-        } else {
-            magnitude
-        };
+        let across = if k > quarter && k < 3 * quarter { -magnitude } else { magnitude };
         let side = if k < 2 * quarter { 1.0 } else { -1.0 };
         let square = magnitude * magnitude;
         let half_thickness = 0.5 * self.thickness * libm::pow(1.0 - square * square, 0.45);

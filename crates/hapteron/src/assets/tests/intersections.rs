@@ -10,11 +10,8 @@ use crate::assets::shape::{Point, cross, dot, subtract};
 ///
 /// Two triangles in general position intersect exactly when this is so for one of their six edges.
 pub fn intersecting_pairs(mesh: &TriMesh) -> Vec<(usize, usize)> {
-    let corners: Vec<[Point; 3]> = mesh
-        .triangles()
-        .iter()
-        .map(|t| t.map(|i| mesh.vertices()[i as usize]))
-        .collect();
+    let corners: Vec<[Point; 3]> =
+        mesh.triangles().iter().map(|t| t.map(|i| mesh.vertices()[i as usize])).collect();
     let cell = cell_size(&corners);
     let mut grid: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
     for (index, triangle) in corners.iter().enumerate() {
@@ -58,10 +55,7 @@ fn cell_size(corners: &[[Point; 3]]) -> f64 {
 
 fn bounds(triangle: &[Point; 3]) -> [Point; 2] {
     let [a, b, c] = triangle;
-    [
-        [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k])),
-        [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k])),
-    ]
+    [[0, 1, 2].map(|k| a[k].min(b[k]).min(c[k])), [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k]))]
 }
 
 fn overlap(first: &[Point; 3], second: &[Point; 3]) -> bool {

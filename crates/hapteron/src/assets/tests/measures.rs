@@ -100,10 +100,7 @@ fn radius(vertices: &[Point]) -> f64 {
         }
     }
     let middle = [0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis]));
-    vertices
-        .iter()
-        .map(|&v| length(subtract(v, middle)))
-        .fold(0.0, f64::max)
+    vertices.iter().map(|&v| length(subtract(v, middle))).fold(0.0, f64::max)
 }
 
 /// FNV-1a over the bits of all coordinates and indices: equal only for the same mesh to the last bit.

@@ -25,17 +25,8 @@ fn assert_sound(name: &str, triangles: usize, euler: i64, radius: std::ops::Rang
     );
     assert_eq!(measures.euler_characteristic, euler, "{name}");
     assert!(measures.volume > 0.0, "{name} is inside out");
-    assert!(
-        radius.contains(&measures.radius),
-        "{name}: radius {} m",
-        measures.radius
-    );
+    assert!(radius.contains(&measures.radius), "{name}: radius {} m", measures.radius);
     let found = intersections::intersecting_pairs(&mesh);
-    assert!(
-        found.is_empty(),
-        "{name}: {} intersecting pairs, first {:?}",
-        found.len(),
-        found.first()
-    );
+    assert!(found.is_empty(), "{name}: {} intersecting pairs, first {:?}", found.len(), found.first());
     measures
 }
