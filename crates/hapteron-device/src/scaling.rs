@@ -47,6 +47,16 @@ impl Scaling {
         }
     }
 
+    /// The sample that a device would give for one in the virtual world.
+    #[must_use]
+    pub fn from_world(&self, sample: &DeviceSample) -> DeviceSample {
+        DeviceSample {
+            position: sample.position / self.position_scale,
+            linear_velocity: sample.linear_velocity / self.position_scale,
+            ..*sample
+        }
+    }
+
     /// What the device is told when the virtual world pushes the handle like this.
     #[must_use]
     pub fn to_device(&self, command: &DeviceCommand) -> DeviceCommand {

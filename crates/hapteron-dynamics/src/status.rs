@@ -38,7 +38,7 @@ impl Status {
 
     /// The bits, for a record.
     #[must_use]
-    pub fn bits(self) -> u32 {
+    pub const fn bits(self) -> u32 {
         self.0
     }
 }

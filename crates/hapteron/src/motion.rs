@@ -137,6 +137,24 @@ impl WayPoints {
     }
 }
 
+/// Motions that [`builtin`] knows.
+pub const BUILTIN_NAMES: [&str; 1] = ["free-space"];
+
+/// A built-in motion by its name, at every `dt`, where it is made (near the origin).
+///
+/// # Errors
+/// A name that is not among [`BUILTIN_NAMES`], or a time step longer than the motion.
+pub fn builtin(name: &str, dt: f64) -> Result<Trajectory, TrajectoryError> {
+    match name {
+        "free-space" => FREE_SPACE.trajectory(dt, &Isometry3::identity()),
+        _ => Err(TrajectoryError {
+            file: format!("builtin:{name}"),
+            line: None,
+            problem: format!("no built-in motion has this name; there are {}", BUILTIN_NAMES.join(", ")),
+        }),
+    }
+}
+
 fn between(points: &[(f64, f64)], t: f64) -> f64 {
     let after = points.partition_point(|p| p.0 <= t);
     match (after.checked_sub(1).map(|i| points[i]), points.get(after)) {

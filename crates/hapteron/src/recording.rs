@@ -1,0 +1,332 @@
+//! Recordings of runs: one row a tick, as `run.csv`, and what they come to.
+
+use crate::scene::Scene;
+use crate::session::{ContactSnapshot, Flags, Tick};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// A run is unstable when the coupling deviation reaches this, metres (`experiments.md`, Fig. 2).
+pub const GREATEST_DEVIATION: f64 = 0.1;
+/// A run is unstable when the coupling angle reaches this, radians.
+pub const GREATEST_ANGLE: f64 = 1.5;
+
+/// Columns of `run.csv`.
+pub const COLUMNS: [&str; 45] = [
+    "t",
+    "handle_px",
+    "handle_py",
+    "handle_pz",
+    "handle_qw",
+    "handle_qx",
+    "handle_qy",
+    "handle_qz",
+    "body_px",
+    "body_py",
+    "body_pz",
+    "body_qw",
+    "body_qx",
+    "body_qy",
+    "body_qz",
+    "body_vx",
+    "body_vy",
+    "body_vz",
+    "body_wx",
+    "body_wy",
+    "body_wz",
+    "coupling_fx",
+    "coupling_fy",
+    "coupling_fz",
+    "coupling_tx",
+    "coupling_ty",
+    "coupling_tz",
+    "contact_fx",
+    "contact_fy",
+    "contact_fz",
+    "contact_tx",
+    "contact_ty",
+    "contact_tz",
+    "feedback_fx",
+    "feedback_fy",
+    "feedback_fz",
+    "feedback_tx",
+    "feedback_ty",
+    "feedback_tz",
+    "deviation",
+    "penetration",
+    "contacts",
+    "clusters",
+    "contact_age",
+    "flags",
+];
+
+/// One tick. SI units, world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// Seconds.
+    pub time: f64,
+    /// The handle in the world's scale.
+    pub handle: Isometry3<f64>,
+    /// The body's mesh frame.
+    pub body: Isometry3<f64>,
+    /// Linear velocity of the mesh frame's origin and angular velocity.
+    pub body_velocity: [Vector3<f64>; 2],
+    /// Force and torque of the coupling on the body at its centre of mass.
+    pub coupling: [Vector3<f64>; 2],
+    /// Force and torque of the contacts on the body at its centre of mass.
+    pub contact: [Vector3<f64>; 2],
+    /// What the device was sent.
+    pub feedback: [Vector3<f64>; 2],
+    /// Coupling deviation, metres.
+    pub deviation: f64,
+    /// Greatest local depth, metres; not positive where the surfaces do not cross, and never below minus the tolerance d.
+    pub penetration: f64,
+    /// Of the query.
+    pub contacts: u32,
+    /// Planes made of them.
+    pub clusters: u32,
+    /// Seconds since the state that the contacts were found at.
+    pub contact_age: f64,
+    /// Anything unusual.
+    pub flags: Flags,
+}
+
+impl Row {
+    /// A tick's row.
+    #[must_use]
+    pub fn new(scene: &Scene, time: f64, tick: &Tick, penetration: f64, contacts: &ContactSnapshot) -> Self {
+        let state = &tick.step.state;
+        let body = scene.world_from_mesh(state);
+        let omega = state.angular_velocity(&scene.body);
+        let arm = body.translation.vector - state.position;
+        Self {
+            time,
+            handle: Isometry3::from_parts(tick.handle.position.into(), tick.handle.orientation),
+            body,
+            body_velocity: [state.linear_velocity(&scene.body) + omega.cross(&arm), omega],
+            coupling: [tick.step.coupling.force, tick.step.coupling.torque],
+            contact: [tick.step.contact.force, tick.step.contact.torque],
+            feedback: [tick.command.force, tick.command.torque],
+            deviation: tick.step.deviation,
+            penetration,
+            contacts: contacts.contacts(),
+            clusters: contacts.clusters(),
+            contact_age: tick.contact_age,
+            flags: tick.flags,
+        }
+    }
+
+    fn numbers(&self) -> [f64; 41] {
+        let mut numbers = [0.0; 41];
+        let mut at = 0;
+        let mut put = |values: &[f64]| {
+            numbers[at..at + values.len()].copy_from_slice(values);
+            at += values.len();
+        };
+        put(&[self.time]);
+        for pose in [&self.handle, &self.body] {
+            let (p, q) = (pose.translation.vector, pose.rotation);
+            put(&[p.x, p.y, p.z, q.w, q.i, q.j, q.k]);
+        }
+        for pair in [&self.body_velocity, &self.coupling, &self.contact, &self.feedback] {
+            for v in pair {
+                put(v.as_slice());
+            }
+        }
+        put(&[self.deviation, self.penetration]);
+        numbers
+    }
+
+    fn from_numbers(n: &[f64; 45]) -> Self {
+        let vector = |i: usize| Vector3::new(n[i], n[i + 1], n[i + 2]);
+        let pose = |i: usize| {
+            let q = Quaternion::new(n[i + 3], n[i + 4], n[i + 5], n[i + 6]);
+            Isometry3::from_parts(Translation3::from(vector(i)), UnitQuaternion::new_unchecked(q))
+        };
+        let pair = |i: usize| [vector(i), vector(i + 3)];
+        Self {
+            time: n[0],
+            handle: pose(1),
+            body: pose(8),
+            body_velocity: pair(15),
+            coupling: pair(21),
+            contact: pair(27),
+            feedback: pair(33),
+            deviation: n[39],
+            penetration: n[40],
+            contacts: n[41] as u32,
+            clusters: n[42] as u32,
+            contact_age: n[43],
+            flags: Flags::from_bits(n[44] as u32),
+        }
+    }
+}
+
+/// A run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recording {
+    /// One a tick.
+    pub rows: Vec<Row>,
+    /// Greatest coupling angle, radians (not a column of `run.csv`).
+    pub greatest_angle: f64,
+    /// When a fault stopped the forces, seconds.
+    pub fault_time: Option<f64>,
+    /// Whether the run was ended before its motion was.
+    pub cancelled: bool,
+}
+
+/// What a recording comes to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Summary {
+    /// Seconds.
+    pub duration: f64,
+    /// No fault, deviation below [`GREATEST_DEVIATION`], angle below [`GREATEST_ANGLE`].
+    pub stable: bool,
+    /// Of the coupling, metres.
+    pub greatest_deviation: f64,
+    /// Of the coupling, radians.
+    pub greatest_angle: f64,
+    /// Of the feedback, N.
+    pub greatest_force: f64,
+    /// Of the feedback, N m.
+    pub greatest_torque: f64,
+    /// Metres; not positive when the surfaces never crossed.
+    pub greatest_penetration: f64,
+    /// Share of the ticks with a contact force.
+    pub in_contact: f64,
+    /// Most contacts of a query.
+    pub most_contacts: u32,
+    /// Most planes at once.
+    pub most_planes: u32,
+    /// Seconds.
+    pub greatest_contact_age: f64,
+    /// Root mean square of the feedback force's step from tick to tick, N, in contact.
+    pub force_roughness: f64,
+}
+
+impl Recording {
+    /// Without rows.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a tick.
+    pub fn push(&mut self, row: Row, tick: &Tick) {
+        self.greatest_angle = self.greatest_angle.max(tick.step.angle);
+        self.rows.push(row);
+    }
+
+    /// What it comes to.
+    #[must_use]
+    pub fn summary(&self) -> Summary {
+        let norm = |v: &Vector3<f64>| libm::sqrt(v.norm_squared());
+        let greatest = |value: &dyn Fn(&Row) -> f64| self.rows.iter().map(value).fold(0.0, f64::max);
+        let touching = |r: &Row| norm(&r.contact[0]) > 0.0;
+        let steps: Vec<f64> = self
+            .rows
+            .windows(2)
+            .filter(|w| touching(&w[0]) && touching(&w[1]))
+            .map(|w| (w[1].feedback[0] - w[0].feedback[0]).norm_squared())
+            .collect();
+        let greatest_deviation = greatest(&|r| r.deviation);
+        Summary {
+            duration: self.rows.last().map_or(0.0, |r| r.time),
+            stable: self.fault_time.is_none()
+                && greatest_deviation < GREATEST_DEVIATION
+                && self.greatest_angle < GREATEST_ANGLE,
+            greatest_deviation,
+            greatest_angle: self.greatest_angle,
+            greatest_force: greatest(&|r| norm(&r.feedback[0])),
+            greatest_torque: greatest(&|r| norm(&r.feedback[1])),
+            greatest_penetration: self.rows.iter().map(|r| r.penetration).fold(f64::NEG_INFINITY, f64::max),
+            in_contact: self.rows.iter().filter(|r| touching(r)).count() as f64
+                / self.rows.len().max(1) as f64,
+            most_contacts: self.rows.iter().map(|r| r.contacts).max().unwrap_or(0),
+            most_planes: self.rows.iter().map(|r| r.clusters).max().unwrap_or(0),
+            greatest_contact_age: greatest(&|r| r.contact_age),
+            force_roughness: libm::sqrt(steps.iter().sum::<f64>() / steps.len().max(1) as f64),
+        }
+    }
+
+    /// Writes `run.csv`; the numbers read back to the same bits.
+    ///
+    /// # Errors
+    /// Those of the file.
+    pub fn write_csv(&self, output: impl Write) -> io::Result<()> {
+        let mut output = io::BufWriter::new(output);
+        writeln!(output, "{}", COLUMNS.join(","))?;
+        for row in &self.rows {
+            for (i, number) in row.numbers().iter().enumerate() {
+                write!(output, "{}{number}", if i == 0 { "" } else { "," })?;
+            }
+            writeln!(output, ",{},{},{},{}", row.contacts, row.clusters, row.contact_age, row.flags.bits())?;
+        }
+        output.flush()
+    }
+
+    /// Reads `run.csv`. The greatest angle is not a column; it is zero.
+    ///
+    /// # Errors
+    /// [`RecordingError`] with file, line and cure.
+    pub fn read_csv(bytes: &[u8], name: &str) -> Result<Self, RecordingError> {
+        let fail =
+            |line: Option<u64>, problem: String| RecordingError { file: name.to_owned(), line, problem };
+        let mut reader = csv::Reader::from_reader(bytes);
+        let header = reader.headers().map_err(|e| fail(None, e.to_string()))?.clone();
+        let mut places = [0; 45];
+        for (place, column) in places.iter_mut().zip(COLUMNS) {
+            *place = header.iter().position(|h| h == column).ok_or_else(|| {
+                fail(Some(1), format!("column '{column}' is missing; this is not a run.csv of hapteron"))
+            })?;
+        }
+        let mut recording = Self::new();
+        for record in reader.records() {
+            let record = record.map_err(|e| fail(e.position().map(csv::Position::line), e.to_string()))?;
+            let line = record.position().map(csv::Position::line);
+            let mut numbers = [0.0; 45];
+            for ((number, &place), column) in numbers.iter_mut().zip(&places).zip(COLUMNS) {
+                let word = record.get(place).unwrap_or_default();
+                *number = word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| {
+                    let shown: String = word.chars().take(40).collect();
+                    fail(line, format!("'{shown}' in column '{column}' is not a finite number"))
+                })?;
+            }
+            let row = Row::from_numbers(&numbers);
+            if row.flags.contains(Flags::FAULT_LATCHED) && recording.fault_time.is_none() {
+                recording.fault_time = Some(row.time);
+            }
+            recording.rows.push(row);
+        }
+        if recording.rows.is_empty() {
+            return Err(fail(None, "there are no rows".to_owned()));
+        }
+        Ok(recording)
+    }
+
+    /// Reads `run.csv` from a file.
+    ///
+    /// # Errors
+    /// As [`Recording::read_csv`], or when the file cannot be read.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
+        let name = path.as_ref().display().to_string();
+        let bytes = std::fs::read(&path).map_err(|e| RecordingError {
+            file: name.clone(),
+            line: None,
+            problem: format!("cannot read the recording: {e}"),
+        })?;
+        Self::read_csv(&bytes, &name)
+    }
+}
+
+/// What is wrong with a recording.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}{}: {problem}", .line.map(|l| format!(", line {l}")).unwrap_or_default())]
+pub struct RecordingError {
+    /// The file.
+    pub file: String,
+    /// Line, counted from 1.
+    pub line: Option<u64>,
+    /// What is wrong and what to do.
+    pub problem: String,
+}

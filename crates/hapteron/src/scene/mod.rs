@@ -1,0 +1,201 @@
+//! Scenes: what is held, what it touches, how, and by which hand.
+//!
+//! A scene is read from TOML ([`file::SceneFile`], every key of which is optional but the meshes), checked, and resolved: the
+//! meshes are loaded, what is missing is filled in, and [`Scene::to_toml`] gives back a file with every value written out, from which
+//! the same scene comes bit for bit. Set-up only; nothing here runs in the haptic tick.
+
+mod error;
+pub mod file;
+mod read;
+mod resolve;
+
+pub use error::SceneError;
+pub use file::{ContactModel, SceneFile};
+
+use crate::trajectory::Trajectory;
+use error::Source;
+use hapteron_collision::Surface;
+use hapteron_collision::mesh::TriMesh;
+use hapteron_device::{DeviceSample, HandParameters, Scaling};
+use hapteron_dynamics::{Coupling, Handle, Method, RigidBody, State};
+use nalgebra::{Isometry3, Vector3};
+use std::path::{Path, PathBuf};
+
+/// A mesh with the structure that queries need.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Scaled to metres.
+    pub mesh: TriMesh,
+    /// Of the mesh, for queries.
+    pub surface: Surface,
+}
+
+/// A fixed object.
+#[derive(Clone, Debug)]
+pub struct PlacedObstacle {
+    /// Its shape.
+    pub model: Model,
+    /// Where it is.
+    pub world_from_mesh: Isometry3<f64>,
+}
+
+/// How contacts become forces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactSettings {
+    /// k of each plane, N/m.
+    pub stiffness: f64,
+    /// b of each plane, N s/m.
+    pub damping: f64,
+    /// d, metres.
+    pub tolerance: f64,
+    /// Most clusters; 0: every contact is a plane of its own.
+    pub max_clusters: usize,
+    /// Contacts farther than this from a cluster found one of their own, metres.
+    pub cluster_radius: f64,
+    /// How the haptic thread uses them.
+    pub model: ContactModel,
+    /// Metres beyond d; none: from the speed, see [`crate::session`].
+    pub anticipation: Option<f64>,
+    /// From the start of one contact pass to the next, seconds.
+    pub period: f64,
+    /// From the start of a pass until its contacts can be used, seconds.
+    pub latency: f64,
+}
+
+/// A scene that is complete and valid.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Every value, as [`Scene::to_toml`] writes it.
+    pub file: SceneFile,
+    /// The grasped object.
+    pub body: RigidBody,
+    /// Its shape.
+    pub model: Model,
+    /// Of the body, mesh frame, metres.
+    pub center_of_mass: Vector3<f64>,
+    /// What it touches.
+    pub obstacles: Vec<PlacedObstacle>,
+    /// Between handle and body.
+    pub coupling: Coupling,
+    /// Contact.
+    pub contact: ContactSettings,
+    /// World, m/s^2.
+    pub gravity: Vector3<f64>,
+    /// Integration method.
+    pub method: Method,
+    /// Of the haptic thread, seconds.
+    pub time_step: f64,
+    /// Between device and world.
+    pub scaling: Scaling,
+    /// The motion of the handle (or of the hand's goal), in the world's scale.
+    pub trajectory: Trajectory,
+    /// A simulated hand; without, the handle follows the trajectory exactly.
+    pub hand: Option<HandParameters>,
+    /// The body at the start.
+    pub start: State,
+}
+
+/// What is changed in a scene as it is read.
+#[derive(Clone, Debug, Default)]
+pub struct Changes {
+    /// `table.key=value`, in this order.
+    pub overrides: Vec<String>,
+    /// A trajectory that the handle follows exactly instead of the scene's hand.
+    pub replay: Option<PathBuf>,
+}
+
+impl Scene {
+    /// Reads a scene and all it names.
+    ///
+    /// # Errors
+    /// Whatever is wrong, with file, line, key and cure.
+    pub fn load(path: impl AsRef<Path>, changes: &Changes) -> Result<Self, SceneError> {
+        let path = path.as_ref();
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|e| SceneError {
+            file: name.clone(),
+            line: None,
+            key: None,
+            problem: format!("cannot read the scene: {e}"),
+        })?;
+        let folder = path.parent().unwrap_or_else(|| Path::new("."));
+        Self::parse(&text, &name, folder, changes)
+    }
+
+    /// Reads a scene from text; `name` stands for the file in errors, and paths are relative to `folder`.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn parse(text: &str, name: &str, folder: &Path, changes: &Changes) -> Result<Self, SceneError> {
+        let source = Source { name: name.to_owned(), text: text.to_owned() };
+        let mut file = read::read(&source, &changes.overrides)?;
+        if let Some(replay) = &changes.replay {
+            let path = std::path::absolute(replay).unwrap_or_else(|_| replay.clone());
+            file.hand = file::Hand { trajectory: Some(path.display().to_string()), ..Default::default() };
+        }
+        resolve::resolve(&source, file, folder)
+    }
+
+    /// Completes a scene that is not read from a file; paths are relative to the current folder.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn from_file(file: SceneFile) -> Result<Self, SceneError> {
+        let name = file.scene.name.clone().unwrap_or_else(|| "scene".to_owned());
+        resolve::resolve(&Source { name, text: String::new() }, file, Path::new("."))
+    }
+
+    /// The scene with every value written out.
+    ///
+    /// # Errors
+    /// None in practice: a value that TOML cannot hold.
+    pub fn to_toml(&self) -> Result<String, SceneError> {
+        toml::to_string(&self.file).map_err(|e| SceneError {
+            file: self.name().to_owned(),
+            line: None,
+            key: None,
+            problem: e.to_string(),
+        })
+    }
+
+    /// The scene's title.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.file.scene.name.as_deref().unwrap_or("scene")
+    }
+
+    /// Seconds.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.trajectory.duration()
+    }
+
+    /// The pose of the body's mesh frame at a state.
+    #[must_use]
+    pub fn world_from_mesh(&self, state: &State) -> Isometry3<f64> {
+        let rotation = state.unit_quaternion();
+        Isometry3::from_parts((state.position - rotation * self.center_of_mass).into(), rotation)
+    }
+}
+
+/// Reads a scene's text without loading what it names: syntax, keys and types only.
+///
+/// # Errors
+/// A [`SceneError`] with the line.
+pub fn parse_file(text: &str, name: &str) -> Result<SceneFile, SceneError> {
+    read::read(&Source { name: name.to_owned(), text: text.to_owned() }, &[])
+}
+
+/// The handle of the dynamics at a device sample in the world's scale.
+#[must_use]
+pub fn handle_at(sample: &DeviceSample) -> Handle {
+    Handle {
+        position: sample.position,
+        orientation: sample.orientation,
+        linear_velocity: sample.linear_velocity,
+        angular_velocity: sample.angular_velocity,
+    }
+}
+
+#[cfg(test)]
+mod tests;

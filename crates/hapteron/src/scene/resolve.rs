@@ -1,0 +1,350 @@
+//! Fills in what a scene leaves out and checks what it says.
+
+use super::error::{SceneError, Source};
+use super::file::{self, Anticipation, Auto, SceneFile};
+use super::{ContactModel, ContactSettings, Model, PlacedObstacle, Scene};
+use crate::trajectory::Trajectory;
+use crate::{assets, motion};
+use hapteron_collision::Surface;
+use hapteron_collision::mesh::{self, TriMesh};
+use hapteron_device::{DeviceSample, HandParameters, Scaling};
+use hapteron_dynamics::{Coupling, Method, RigidBody, Spring, State};
+use nalgebra::{Isometry3, Matrix3, Quaternion, UnitQuaternion, Vector3};
+use std::path::Path;
+
+const BUILTIN: &str = "builtin:";
+/// Density of a body that is given neither mass nor density: water's, kg/m^3.
+const DENSITY: f64 = 1000.0;
+/// Radius of a contact cluster as a share of the body's.
+const CLUSTER_RADIUS: f64 = 0.15;
+/// A quaternion this close to unit length is used bit for bit.
+const EXACT_UNIT: f64 = 1e-14;
+
+type Resolved<T> = Result<T, SceneError>;
+
+pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Resolved<Scene> {
+    let resolver = Resolver { source, folder };
+    let time_step = resolver.positive("integrator.time_step", &mut file.integrator.time_step, 1e-3)?;
+    let method = *file.integrator.method.get_or_insert(file::Method::BackwardEuler);
+    file.scene.name.get_or_insert_with(|| "scene".to_owned());
+    file.scene.seed.get_or_insert(0);
+    let gravity = resolver.vector("scene.gravity", *file.scene.gravity.get_or_insert([0.0; 3]))?;
+
+    let model = resolver.model("body.mesh", &mut file.body.mesh, "body.scale", &mut file.body.scale)?;
+    let (body, center_of_mass) = resolver.mass(&mut file.body, &model.mesh)?;
+    let obstacles = resolver.obstacles(&mut file.obstacle)?;
+    let scaling = file.device.position_scale.get_or_insert(1.0);
+    let scaling = Scaling::new(*scaling).map_err(|e| source.fault("device.position_scale", e.to_string()))?;
+    let (trajectory, hand) = resolver.hand(&mut file.hand, time_step)?;
+
+    let handle = trajectory.sample(0.0, time_step);
+    let coupling = resolver.coupling(&mut file, &handle, center_of_mass)?;
+    let start = resolver.start(&mut file, &handle, &body, center_of_mass)?;
+    let contact = resolver.contact(&mut file, &body, &model.surface, time_step)?;
+    Ok(Scene {
+        file,
+        body,
+        model,
+        center_of_mass,
+        obstacles,
+        coupling,
+        contact,
+        gravity,
+        method: match method {
+            file::Method::BackwardEuler => Method::BackwardEuler,
+            file::Method::BackwardEulerNewton => Method::BackwardEulerNewton,
+            file::Method::RungeKutta4 => Method::RungeKutta4,
+            file::Method::ForwardEuler => Method::ForwardEuler,
+            file::Method::QuasiStatic => Method::QuasiStatic,
+        },
+        time_step,
+        scaling,
+        trajectory,
+        hand,
+        start,
+    })
+}
+
+struct Resolver<'a> {
+    source: &'a Source,
+    folder: &'a Path,
+}
+
+impl Resolver<'_> {
+    fn positive(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
+        let v = *value.get_or_insert(default);
+        if v > 0.0 && v.is_finite() {
+            return Ok(v);
+        }
+        Err(self.source.fault(key, format!("is {v}; it must be positive and finite")))
+    }
+
+    fn not_negative(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
+        let v = *value.get_or_insert(default);
+        if v >= 0.0 && v.is_finite() {
+            return Ok(v);
+        }
+        Err(self.source.fault(key, format!("is {v}; it must be finite and not negative")))
+    }
+
+    fn vector(&self, key: &str, v: [f64; 3]) -> Resolved<Vector3<f64>> {
+        if v.iter().all(|c| c.is_finite()) {
+            return Ok(Vector3::from(v));
+        }
+        Err(self.source.fault(key, format!("is {v:?}; every component must be finite")))
+    }
+
+    fn rotation(&self, key: &str, v: &mut [f64; 4]) -> Resolved<UnitQuaternion<f64>> {
+        let [w, x, y, z] = *v;
+        let square = w * w + x * x + y * y + z * z;
+        let length = libm::sqrt(square);
+        if !((length - 1.0).abs() <= 1e-2) {
+            let text = format!("is {v:?}, of length {length}; it must be a unit quaternion w, x, y, z");
+            return Err(self.source.fault(key, text));
+        }
+        // Dividing one that is unit already would change its last bits, and a written scene must come back as it was.
+        if (square - 1.0).abs() > EXACT_UNIT {
+            *v = v.map(|c| c / length);
+        }
+        let [w, x, y, z] = *v;
+        Ok(UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)))
+    }
+
+    fn model(
+        &self,
+        key: &str,
+        name: &mut String,
+        scale_key: &str,
+        scale: &mut Option<f64>,
+    ) -> Resolved<Model> {
+        let factor = self.positive(scale_key, scale, 1.0)?;
+        let raw: TriMesh = if let Some(builtin) = name.strip_prefix(BUILTIN) {
+            assets::builtin(builtin).map_err(|e| self.source.fault(key, e.to_string()))?
+        } else {
+            let path = self.path(name);
+            let mesh = mesh::load(&path).map_err(|e| self.source.fault(key, e.to_string()))?;
+            *name = path;
+            mesh
+        };
+        let mesh = if factor == 1.0 {
+            raw
+        } else {
+            raw.scaled(factor).map_err(|e| self.source.fault(scale_key, e.to_string()))?
+        };
+        let surface = Surface::build(&mesh);
+        Ok(Model { mesh, surface })
+    }
+
+    /// Relative to the scene's folder, and absolute, so that a written scene finds its files from anywhere.
+    fn path(&self, name: &str) -> String {
+        let joined = self.folder.join(name);
+        std::fs::canonicalize(&joined).unwrap_or(joined).display().to_string()
+    }
+
+    fn obstacles(&self, obstacles: &mut [file::Obstacle]) -> Resolved<Vec<PlacedObstacle>> {
+        let mut placed = Vec::with_capacity(obstacles.len());
+        for (index, obstacle) in obstacles.iter_mut().enumerate() {
+            let key = |field: &str| format!("obstacle.{index}.{field}");
+            let model = self.model(&key("mesh"), &mut obstacle.mesh, &key("scale"), &mut obstacle.scale)?;
+            let position = self.vector(&key("position"), *obstacle.position.get_or_insert([0.0; 3]))?;
+            let orientation = obstacle.orientation.get_or_insert([1.0, 0.0, 0.0, 0.0]);
+            let rotation = self.rotation(&key("orientation"), orientation)?;
+            placed.push(PlacedObstacle {
+                model,
+                world_from_mesh: Isometry3::from_parts(position.into(), rotation),
+            });
+        }
+        Ok(placed)
+    }
+
+    fn mass(&self, body: &mut file::Body, mesh: &TriMesh) -> Resolved<(RigidBody, Vector3<f64>)> {
+        let both =
+            |a: &str, b: &str| self.source.fault(a, format!("stands beside `{b}`; give one of the two"));
+        if body.mass.is_some() && body.density.is_some() {
+            return Err(both("body.density", "body.mass"));
+        }
+        if body.inertia.is_some() && body.inertia_per_mass.is_some() {
+            return Err(both("body.inertia_per_mass", "body.inertia"));
+        }
+        let inertia_given = body.inertia.is_some() || body.inertia_per_mass.is_some();
+        let from_mesh = if body.mass.is_some() && inertia_given && body.center_of_mass.is_some() {
+            None
+        } else {
+            let found = mesh::mass_properties(mesh).map_err(|e| {
+                let text = format!(
+                    "mass properties are not to be had from this mesh: {e}. Give `mass`, `inertia` and `center_of_mass`, or close the mesh"
+                );
+                self.source.fault("body.mesh", text)
+            })?;
+            Some(found)
+        };
+        let density = body.density.take();
+        if let Some(v) = density.filter(|v| !(*v > 0.0 && v.is_finite())) {
+            return Err(self.source.fault("body.density", format!("is {v}; it must be positive and finite")));
+        }
+        let volume = from_mesh.map_or(0.0, |m| m.volume);
+        let mass = self.positive("body.mass", &mut body.mass, density.unwrap_or(DENSITY) * volume)?;
+        let per_mass = body.inertia_per_mass.take().map(matrix);
+        let inertia = match (body.inertia, per_mass, from_mesh) {
+            (Some(rows), _, _) => matrix(rows),
+            (None, Some(per_mass), _) => per_mass * mass,
+            (None, None, Some(found)) => found.inertia_per_mass * mass,
+            (None, None, None) => Matrix3::zeros(),
+        };
+        body.inertia = Some(std::array::from_fn(|r| std::array::from_fn(|c| inertia[(r, c)])));
+        let center = from_mesh.map_or([0.0; 3], |m| m.center_of_mass.into());
+        let center = self.vector("body.center_of_mass", *body.center_of_mass.get_or_insert(center))?;
+        let rigid =
+            RigidBody::new(mass, inertia).map_err(|e| self.source.fault("body.inertia", e.to_string()))?;
+        Ok((rigid, center))
+    }
+
+    fn hand(&self, hand: &mut file::Hand, dt: f64) -> Resolved<(Trajectory, Option<HandParameters>)> {
+        let Some(name) = &mut hand.trajectory else {
+            let text = "is missing: in virtual time the handle needs a motion. Give a CSV file (t,px,py,pz,qw,qx,qy,qz), `builtin:NAME`, or --replay FILE";
+            return Err(self.source.fault("hand.trajectory", text));
+        };
+        let fault =
+            |e: crate::trajectory::TrajectoryError| self.source.fault("hand.trajectory", e.to_string());
+        let trajectory = if let Some(builtin) = name.strip_prefix(BUILTIN) {
+            motion::builtin(builtin, dt).map_err(fault)?
+        } else {
+            let path = self.path(name);
+            *name = path.clone();
+            Trajectory::load(path).map_err(fault)?
+        };
+        let parameters = match (hand.mass, hand.damping, hand.stiffness) {
+            (None, None, None) => None,
+            (Some(mass), Some(damping), Some(stiffness)) => Some(HandParameters { mass, damping, stiffness }),
+            _ => {
+                let text = "a simulated hand needs mass, damping and stiffness together; leave all three out for a handle that follows the motion exactly";
+                return Err(self.source.fault("hand.mass", text));
+            }
+        };
+        if let Some(parameters) = parameters {
+            hapteron_device::Hand::new(parameters, &trajectory.sample(0.0, dt))
+                .map_err(|e| self.source.fault("hand.mass", e.to_string()))?;
+        }
+        Ok((trajectory, parameters))
+    }
+
+    /// The grasp is given, or recorded from where handle and body are at the start (section 5.1 of the paper).
+    fn coupling(
+        &self,
+        file: &mut SceneFile,
+        handle: &DeviceSample,
+        center: Vector3<f64>,
+    ) -> Resolved<Coupling> {
+        let c = &mut file.coupling;
+        let given = match (file.body.position, &mut file.body.orientation) {
+            (Some(p), Some(q)) => {
+                let rotation = self.rotation("body.orientation", q)?;
+                Some(Isometry3::from_parts(self.vector("body.position", p)?.into(), rotation))
+            }
+            _ => None,
+        };
+        let default_position = given.map_or(center, |pose| {
+            pose.inverse_transform_point(&nalgebra::Point3::from(handle.position)).coords
+        });
+        let default_orientation =
+            given.map_or(UnitQuaternion::identity(), |p| p.rotation.inverse() * handle.orientation);
+        let position =
+            self.vector("coupling.grasp_position", *c.grasp_position.get_or_insert(default_position.into()))?;
+        let q = default_orientation;
+        let orientation = self.rotation(
+            "coupling.grasp_orientation",
+            c.grasp_orientation.get_or_insert([q.w, q.i, q.j, q.k]),
+        )?;
+        let spring = |stiffness: f64, limit: Option<f64>| Spring { stiffness, limit };
+        Coupling::new(
+            spring(
+                self.not_negative("coupling.linear_stiffness", &mut c.linear_stiffness, 500.0)?,
+                c.max_force,
+            ),
+            self.not_negative("coupling.linear_damping", &mut c.linear_damping, 3.0)?,
+            spring(
+                self.not_negative("coupling.angular_stiffness", &mut c.angular_stiffness, 0.6)?,
+                c.max_torque,
+            ),
+            self.not_negative("coupling.angular_damping", &mut c.angular_damping, 0.006)?,
+            position - center,
+            orientation,
+        )
+        .map_err(|e| self.source.fault("coupling.max_force", e.to_string()))
+    }
+
+    /// The body at the start: where it is said to be, or where the coupling has no deviation.
+    fn start(
+        &self,
+        file: &mut SceneFile,
+        handle: &DeviceSample,
+        body: &RigidBody,
+        center: Vector3<f64>,
+    ) -> Resolved<State> {
+        let posed = file.body.position.is_some() && file.body.orientation.is_some();
+        let grasp = Vector3::from(file.coupling.grasp_position.unwrap_or_default());
+        let mut held = file.coupling.grasp_orientation.unwrap_or([1.0, 0.0, 0.0, 0.0]);
+        let held = self.rotation("coupling.grasp_orientation", &mut held)?;
+        let q = handle.orientation * held.inverse();
+        let orientation = file.body.orientation.get_or_insert([q.w, q.i, q.j, q.k]);
+        let rotation = self.rotation("body.orientation", orientation)?;
+        let default = handle.position - rotation * grasp;
+        let position = self.vector("body.position", *file.body.position.get_or_insert(default.into()))?;
+        let (v, omega) = if posed {
+            (Vector3::zeros(), Vector3::zeros())
+        } else {
+            let arm = rotation * grasp;
+            (handle.linear_velocity - handle.angular_velocity.cross(&arm), handle.angular_velocity)
+        };
+        let v = self.vector("body.linear_velocity", *file.body.linear_velocity.get_or_insert(v.into()))?;
+        let omega =
+            self.vector("body.angular_velocity", *file.body.angular_velocity.get_or_insert(omega.into()))?;
+        let arm = rotation * center;
+        Ok(State::moving(body, position + arm, &rotation, &(v + omega.cross(&arm)), &omega))
+    }
+
+    fn contact(
+        &self,
+        file: &mut SceneFile,
+        body: &RigidBody,
+        surface: &Surface,
+        time_step: f64,
+    ) -> Resolved<ContactSettings> {
+        let c = &mut file.contact;
+        for (key, value) in
+            [("contact.error_threshold", &mut c.error_threshold), ("contact.friction", &mut c.friction)]
+        {
+            if self.not_negative(key, value, 0.0)? > 0.0 {
+                let text = "is not available yet; contacts are exact and without friction. Set it to 0";
+                return Err(self.source.fault(key, text));
+            }
+        }
+        let stiffness = self.positive("contact.stiffness", &mut c.stiffness, 5000.0)?;
+        // Half of critical, 0.5 * 2 sqrt(k m): more only raises the impact force (experiments on Fig. 4).
+        let half_critical = libm::sqrt(stiffness * body.mass());
+        let damping = self.not_negative("contact.damping", &mut c.damping, half_critical)?;
+        let tolerance = self.not_negative("contact.tolerance", &mut c.tolerance, 0.0005)?;
+        let anticipation = match *c.anticipation.get_or_insert(Anticipation::Auto(Auto::Auto)) {
+            Anticipation::Auto(_) => None,
+            Anticipation::Metres(metres) => {
+                Some(self.not_negative("contact.anticipation", &mut Some(metres), 0.0)?)
+            }
+        };
+        let thread = &mut file.contact_thread;
+        Ok(ContactSettings {
+            stiffness,
+            damping,
+            tolerance,
+            max_clusters: *c.max_clusters.get_or_insert(0),
+            cluster_radius: CLUSTER_RADIUS * surface.radius(),
+            model: *c.model.get_or_insert(ContactModel::Planes),
+            anticipation,
+            period: self.positive("contact_thread.period", &mut thread.period, time_step)?,
+            latency: self.not_negative("contact_thread.latency", &mut thread.latency, time_step)?,
+        })
+    }
+}
+
+fn matrix(rows: [[f64; 3]; 3]) -> Matrix3<f64> {
+    Matrix3::from_fn(|r, c| rows[r][c])
+}

@@ -1,0 +1,106 @@
+use super::*;
+use nalgebra::UnitQuaternion;
+
+const SCENE: &str = "[body]\nmesh = \"builtin:spoon\"\n[[obstacle]]\nmesh = \"builtin:cup\"\n[hand]\ntrajectory = \"builtin:free-space\"\n";
+
+fn parse(text: &str) -> Result<Scene, SceneError> {
+    Scene::parse(text, "s.toml", Path::new("."), &Changes::default())
+}
+
+fn with(line: &str) -> String {
+    // The line goes at the head of its table's part, the text after.
+    let (table, rest) = line.split_once('/').unwrap();
+    if SCENE.contains(&format!("[{table}]\n")) {
+        SCENE.replace(&format!("[{table}]\n"), &format!("[{table}]\n{rest}\n"))
+    } else {
+        format!("{SCENE}[{table}]\n{rest}\n")
+    }
+}
+
+fn fault(line: &str) -> String {
+    parse(&with(line)).unwrap_err().to_string()
+}
+
+/// Would catch a value that the written scene loses or changes in its last bit.
+#[test]
+fn a_written_scene_comes_back_bit_for_bit() {
+    let scene = parse(&with("body/mass = 0.0123")).unwrap();
+    let text = scene.to_toml().unwrap();
+    let again = parse(&text).unwrap();
+    assert_eq!(scene.file, again.file);
+    assert_eq!(scene.start, again.start);
+    assert_eq!(scene.body, again.body);
+    assert_eq!(scene.coupling, again.coupling);
+    assert_eq!(text, again.to_toml().unwrap());
+}
+
+/// Would catch a start that jerks the hand.
+#[test]
+fn a_body_without_a_pose_starts_without_deviation_and_at_rest_relative_to_the_handle() {
+    let folder = std::env::temp_dir().join(format!("hapteron-scene-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let motion = "t,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n0,1,2,3,0.6,0,0.8,0,0.1,0.2,0.3,1,2,3\n1,1,2,3,0.6,0,0.8,0,0,0,0,0,0,0\n";
+    std::fs::write(folder.join("m.csv"), motion).unwrap();
+    let text = SCENE.replace("builtin:free-space", "m.csv")
+        + "[coupling]\ngrasp_position=[0.05,0.01,0.02]\ngrasp_orientation=[0.8,0.6,0,0]\n";
+    let scene = Scene::parse(&text, "s.toml", &folder, &Changes::default()).unwrap();
+    let handle = handle_at(&scene.trajectory.sample(0.0, scene.time_step));
+    let (feedback, deviation, angle) = scene.coupling.feedback(&handle, &scene.start, &scene.body);
+    assert!(deviation < 1e-12 && angle < 1e-12, "{deviation} {angle}");
+    assert!(feedback.force.norm() < 1e-12 && feedback.torque.norm() < 1e-12, "{feedback:?}");
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// Would catch a grasp that is not recorded where the handle is.
+#[test]
+fn a_body_with_a_pose_is_held_where_the_handle_is() {
+    let q = UnitQuaternion::from_euler_angles(0.3, -0.2, 1.0);
+    let line = format!("body/position = [0.1, 0.2, 0.3]\norientation = [{}, {}, {}, {}]", q.w, q.i, q.j, q.k);
+    let scene = parse(&with(&line)).unwrap();
+    let handle = handle_at(&scene.trajectory.sample(0.0, scene.time_step));
+    let (_, deviation, angle) = scene.coupling.feedback(&handle, &scene.start, &scene.body);
+    assert!(deviation < 1e-12 && angle < 1e-12, "{deviation} {angle}");
+    assert_eq!(scene.start.linear_velocity(&scene.body).norm(), 0.0);
+}
+
+#[test]
+fn faults_name_the_line_the_key_and_the_cure() {
+    let negative = fault("contact/stiffness = -1");
+    assert_eq!(negative, "s.toml, line 8, `contact.stiffness`: is -1; it must be positive and finite");
+    assert!(fault("coupling/linear_stiffness = -1").contains("not negative"));
+    assert!(fault("body/mass = 0").contains("positive"));
+    assert!(fault("body/mass = nan").contains("positive"));
+    assert!(fault("body/mass = 1\ndensity = 2").contains("one of the two"));
+    assert!(fault("body/inertia = [[1,0,0],[0,1,0],[0,0,5]]\nmass = 1").contains("inertia"));
+    assert!(fault("body/orientation = [0,0,0,0]").contains("unit quaternion"));
+    assert!(fault("body/scale = 0").contains("line 2"));
+    assert!(fault("contact/friction = 0.3").contains("not available yet"));
+    assert!(fault("contact/anticipation = -0.1").contains("not negative"));
+    assert!(fault("contact_thread/period = 0").contains("positive"));
+    assert!(fault("integrator/time_step = inf").contains("positive"));
+    assert!(fault("hand/mass = 1").contains("together"));
+    assert!(fault("device/position_scale = 0").contains("position_scale"));
+    let text = SCENE.replace("builtin:spoon", "builtin:spon");
+    assert!(parse(&text).unwrap_err().to_string().contains("there are"), "{text}");
+    let text = SCENE.replace("builtin:spoon", "nowhere.stl");
+    assert!(parse(&text).unwrap_err().to_string().contains("nowhere.stl"));
+    let text = SCENE.replace("builtin:free-space", "builtin:x");
+    assert!(parse(&text).unwrap_err().to_string().contains("free-space"));
+    assert!(parse("[body]\nmesh = \"builtin:spoon\"\n").unwrap_err().to_string().contains("--replay"));
+}
+
+/// Would catch a flat body that gets a mass from nowhere.
+#[test]
+fn a_body_without_volume_needs_its_mass_properties() {
+    let folder = std::env::temp_dir().join(format!("hapteron-flat-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("flat.obj"), "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n").unwrap();
+    let text = SCENE.replace("builtin:spoon", "flat.obj");
+    let try_it = |text: &str| Scene::parse(text, "s.toml", &folder, &Changes::default());
+    let message = try_it(&text).unwrap_err().to_string();
+    assert!(message.contains("Give `mass`, `inertia` and `center_of_mass`"), "{message}");
+    let given =
+        "[body]\nmass = 0.01\ninertia = [[1e-5,0,0],[0,1e-5,0],[0,0,2e-5]]\ncenter_of_mass = [0,0,0]\n";
+    assert!(try_it(&text.replace("[body]\n", given)).is_ok());
+    std::fs::remove_dir_all(&folder).unwrap();
+}

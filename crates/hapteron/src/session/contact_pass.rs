@@ -1,0 +1,229 @@
+//! The contact pass: from the state of the body to the planes that hold it back.
+
+use super::Flags;
+use crate::scene::{ContactModel, ContactSettings, Scene};
+use hapteron_collision::cluster::{ClusterParameters, Clusterer};
+use hapteron_collision::{Contact, QueryWorkspace, query};
+use hapteron_dynamics::{ContactPlane, LinearizedContact, RigidBody, State};
+use nalgebra::Vector3;
+
+/// Most planes that a snapshot holds; with more contacts the deepest are kept and a flag says so.
+pub const MAX_PLANES: usize = 4096;
+/// Anticipation margin with `anticipation = "auto"`: this many times speed * (period + latency) ...
+const ANTICIPATED_TIMES: f64 = 1.5;
+/// ... but no more than this share of the body's radius, beyond which queries cost more than they tell.
+const GREATEST_MARGIN: f64 = 0.1;
+
+/// What a pass found, at one state of the body.
+///
+/// Its lists have their full capacity from the start: filling one anew does not allocate.
+#[derive(Clone, Debug)]
+pub struct ContactSnapshot {
+    time: f64,
+    planes: Vec<ContactPlane>,
+    linearized: LinearizedContact,
+    contacts: u32,
+    clusters: u32,
+    min_distance: f64,
+    flags: Flags,
+}
+
+impl ContactSnapshot {
+    /// Knows of no contacts.
+    #[must_use]
+    pub fn empty(body: &RigidBody, state: &State) -> Self {
+        Self {
+            time: 0.0,
+            planes: Vec::with_capacity(MAX_PLANES),
+            linearized: LinearizedContact::from_planes(&[], body, state),
+            contacts: 0,
+            clusters: 0,
+            min_distance: f64::INFINITY,
+            flags: Flags::NO_CONTACTS_YET,
+        }
+    }
+
+    /// The planes, those of the anticipation margin included.
+    #[must_use]
+    pub fn planes(&self) -> &[ContactPlane] {
+        &self.planes
+    }
+
+    /// Wrench and Jacobian at the snapshot's state. Eq. 30.
+    #[must_use]
+    pub fn linearized(&self) -> &LinearizedContact {
+        &self.linearized
+    }
+
+    /// When the body was in the state that was looked at, seconds.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// How many contacts the query found.
+    #[must_use]
+    pub fn contacts(&self) -> u32 {
+        self.contacts
+    }
+
+    /// How many planes came of them.
+    #[must_use]
+    pub fn clusters(&self) -> u32 {
+        self.clusters
+    }
+
+    /// Of the surfaces at the snapshot's state, negative where they cross, metres; infinite when nothing was within the query's tolerance.
+    #[must_use]
+    pub fn min_distance(&self) -> f64 {
+        self.min_distance
+    }
+
+    /// Bits that every tick with this snapshot carries.
+    #[must_use]
+    pub fn flags(&self) -> Flags {
+        self.flags
+    }
+
+    /// Fills the snapshot with planes at a state.
+    ///
+    /// Frames: world, the points of the body relative to its centre of mass in body axes. More than [`MAX_PLANES`]: the deepest are kept.
+    fn fill(
+        &mut self,
+        candidates: &mut Vec<(f64, ContactPlane)>,
+        body: &RigidBody,
+        state: &State,
+        model: ContactModel,
+    ) {
+        self.flags = Flags::default();
+        if candidates.len() > MAX_PLANES {
+            self.flags = Flags::CONTACTS_TRUNCATED;
+            // A stable sort, so that equals stay in the query's order.
+            candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
+            candidates.truncate(MAX_PLANES);
+        }
+        self.planes.clear();
+        self.planes.extend(candidates.iter().map(|c| c.1));
+        self.clusters = self.planes.len() as u32;
+        if model != ContactModel::Planes {
+            self.linearized = LinearizedContact::from_planes(&self.planes, body, state);
+        }
+    }
+}
+
+/// Runs passes; holds what one pass leaves for the next. Not for the haptic thread: it allocates as contacts grow.
+#[derive(Debug)]
+pub struct ContactPass {
+    workspaces: Vec<QueryWorkspace>,
+    measuring: Vec<QueryWorkspace>,
+    clusterer: Option<Clusterer>,
+    contacts: Vec<Contact>,
+    candidates: Vec<(f64, ContactPlane)>,
+}
+
+impl ContactPass {
+    /// For a scene.
+    #[must_use]
+    pub fn new(scene: &Scene) -> Self {
+        let settings = &scene.contact;
+        let parameters =
+            ClusterParameters { max_clusters: settings.max_clusters, radius: settings.cluster_radius };
+        Self {
+            workspaces: scene.obstacles.iter().map(|_| QueryWorkspace::new()).collect(),
+            measuring: scene.obstacles.iter().map(|_| QueryWorkspace::new()).collect(),
+            clusterer: (settings.max_clusters > 0).then(|| Clusterer::new(parameters)),
+            contacts: Vec::new(),
+            candidates: Vec::new(),
+        }
+    }
+
+    /// Finds the contacts at a state of `time` and fills a snapshot with their planes. `handle_speed` (m/s, that of the point of the
+    /// body that the handle would move fastest) tells how far to look ahead.
+    pub fn run(
+        &mut self,
+        scene: &Scene,
+        state: &State,
+        handle_speed: f64,
+        time: f64,
+        snapshot: &mut ContactSnapshot,
+    ) {
+        let settings = &scene.contact;
+        let reach = settings.tolerance + self.margin(scene, state, handle_speed);
+        let world_from_mesh = scene.world_from_mesh(state);
+        self.contacts.clear();
+        let mut min_distance = f64::INFINITY;
+        for (obstacle, workspace) in scene.obstacles.iter().zip(&mut self.workspaces) {
+            let found = query(
+                &scene.model.surface,
+                &world_from_mesh,
+                &obstacle.model.surface,
+                &obstacle.world_from_mesh,
+                reach,
+                workspace,
+            );
+            min_distance = min_distance.min(found.min_distance);
+            self.contacts.extend_from_slice(found.contacts);
+        }
+        snapshot.time = time;
+        snapshot.min_distance = min_distance;
+        snapshot.contacts = self.contacts.len() as u32;
+        self.candidates.clear();
+        let rotation = state.unit_quaternion();
+        let mut add = |point: &Vector3<f64>, on_obstacle: &Vector3<f64>, normal: Vector3<f64>, depth: f64| {
+            let point_b = rotation.inverse_transform_vector(&(point - state.position));
+            let ContactSettings { stiffness, damping, tolerance, .. } = *settings;
+            let plane = ContactPlane::new(point_b, on_obstacle, normal, stiffness, damping, tolerance);
+            self.candidates.push((depth, plane));
+        };
+        match &mut self.clusterer {
+            Some(clusterer) => {
+                for c in clusterer.update(&self.contacts, reach, &world_from_mesh) {
+                    add(&c.point_body, &c.point_obstacle, c.normal, c.depth);
+                }
+            }
+            None => {
+                for c in &self.contacts {
+                    add(&c.point_body, &c.point_obstacle, c.normal, c.depth);
+                }
+            }
+        }
+        snapshot.fill(&mut self.candidates, &scene.body, state, settings.model);
+    }
+
+    /// The signed distance of the surfaces at a state, metres; infinite when it is more than the tolerance d.
+    pub fn measure(&mut self, scene: &Scene, state: &State) -> f64 {
+        let world_from_mesh = scene.world_from_mesh(state);
+        let mut min_distance = f64::INFINITY;
+        for (obstacle, workspace) in scene.obstacles.iter().zip(&mut self.measuring) {
+            let found = query(
+                &scene.model.surface,
+                &world_from_mesh,
+                &obstacle.model.surface,
+                &obstacle.world_from_mesh,
+                scene.contact.tolerance,
+                workspace,
+            );
+            min_distance = min_distance.min(found.min_distance);
+        }
+        min_distance
+    }
+
+    /// How far beyond d contacts are looked for, metres: as far as a point of the body can come until the pass after this one takes over.
+    ///
+    /// Only planes, which never pull, may be known ahead of touch.
+    fn margin(&self, scene: &Scene, state: &State, handle_speed: f64) -> f64 {
+        let settings = &scene.contact;
+        if settings.model != ContactModel::Planes {
+            return 0.0;
+        }
+        if let Some(metres) = settings.anticipation {
+            return metres;
+        }
+        let radius = scene.model.surface.radius();
+        let norm = |v: Vector3<f64>| libm::sqrt(v.norm_squared());
+        let speed =
+            norm(state.linear_velocity(&scene.body)) + norm(state.angular_velocity(&scene.body)) * radius;
+        let ahead = ANTICIPATED_TIMES * speed.max(handle_speed) * (settings.period + settings.latency);
+        ahead.max(settings.tolerance).min(GREATEST_MARGIN * radius)
+    }
+}
