@@ -1,1 +1,39 @@
-fn main() {}
+//! The `hapteron` command.
+//!
+//! Results go to stdout or files, messages to stderr. Exit code 0: done; 1: it failed, or a run was not stable, or an experiment's row
+//! does not hold; 2: wrong usage.
+
+mod arguments;
+mod commands;
+mod progress;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let outcome = match arguments.command {
+        Command::Demo(a) => commands::demo::demo(&a),
+        Command::Run(a) => commands::run::run(&a),
+        Command::Query(a) => commands::query::query(&a),
+        Command::Mesh(a) => commands::mesh::mesh(&a),
+        Command::Models(a) => commands::models::models(&a),
+    };
+    match outcome {
+        Ok(code) => code,
+        Err(error) if closed_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Whoever read our output has enough of it: no failure (`hapteron query ... | head`).
+fn closed_pipe(error: &anyhow::Error) -> bool {
+    error
+        .chain()
+        .filter_map(|e| e.downcast_ref::<std::io::Error>())
+        .any(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+}

@@ -53,7 +53,9 @@ fn set(table: &mut toml::Table, text: &str) -> Result<(), String> {
         [table, key] => (table, None, key),
         [table, index, key] => (table, Some(index), key),
         _ => {
-            return Err(format!("'{path}' is not a key; a key is written table.key, as in contact.stiffness"));
+            return Err(format!(
+                "'{path}' is not a key; a key is written table.key, as in contact.stiffness"
+            ));
         }
     };
     let entry = table.entry(table_name).or_insert_with(|| toml::Value::Table(toml::Table::new()));

@@ -1,14 +1,15 @@
 //! The contact pass: from the state of the body to the planes that hold it back.
 
 use super::Flags;
+use super::thinning::{Candidate, thin};
 use crate::scene::{ContactModel, ContactSettings, Scene};
 use hapteron_collision::cluster::{ClusterParameters, Clusterer};
 use hapteron_collision::{Contact, QueryWorkspace, query};
 use hapteron_dynamics::{ContactPlane, LinearizedContact, RigidBody, State};
 use nalgebra::Vector3;
 
-/// Most planes that a snapshot holds; with more contacts the deepest are kept and a flag says so.
-pub const MAX_PLANES: usize = 4096;
+/// Most planes that a snapshot holds; of more contacts the deepest of each neighbourhood are kept and a flag says so.
+pub const MAX_PLANES: usize = 1024;
 /// Anticipation margin with `anticipation = "auto"`: this many times speed * (period + latency) ...
 const ANTICIPATED_TIMES: f64 = 1.5;
 /// ... but no more than this share of the body's radius, beyond which queries cost more than they tell.
@@ -87,23 +88,18 @@ impl ContactSnapshot {
 
     /// Fills the snapshot with planes at a state.
     ///
-    /// Frames: world, the points of the body relative to its centre of mass in body axes. More than [`MAX_PLANES`]: the deepest are kept.
+    /// Frames: world, the points of the body relative to its centre of mass in body axes.
     fn fill(
         &mut self,
-        candidates: &mut Vec<(f64, ContactPlane)>,
+        planes: &[Candidate],
+        thinned: bool,
         body: &RigidBody,
         state: &State,
         model: ContactModel,
     ) {
-        self.flags = Flags::default();
-        if candidates.len() > MAX_PLANES {
-            self.flags = Flags::CONTACTS_TRUNCATED;
-            // A stable sort, so that equals stay in the query's order.
-            candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
-            candidates.truncate(MAX_PLANES);
-        }
+        self.flags = if thinned { Flags::CONTACTS_THINNED } else { Flags::default() };
         self.planes.clear();
-        self.planes.extend(candidates.iter().map(|c| c.1));
+        self.planes.extend(planes.iter().map(|c| c.1));
         self.clusters = self.planes.len() as u32;
         if model != ContactModel::Planes {
             self.linearized = LinearizedContact::from_planes(&self.planes, body, state);
@@ -118,7 +114,7 @@ pub struct ContactPass {
     measuring: Vec<QueryWorkspace>,
     clusterer: Option<Clusterer>,
     contacts: Vec<Contact>,
-    candidates: Vec<(f64, ContactPlane)>,
+    candidates: Vec<Candidate>,
 }
 
 impl ContactPass {
@@ -187,7 +183,8 @@ impl ContactPass {
                 }
             }
         }
-        snapshot.fill(&mut self.candidates, &scene.body, state, settings.model);
+        let thinned = thin(&mut self.candidates, scene.model.surface.radius(), MAX_PLANES);
+        snapshot.fill(&self.candidates, thinned, &scene.body, state, settings.model);
     }
 
     /// The signed distance of the surfaces at a state, metres; infinite when it is more than the tolerance d.

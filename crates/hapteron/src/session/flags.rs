@@ -7,8 +7,8 @@ use hapteron_dynamics::Status;
 pub struct Flags(u32);
 
 impl Flags {
-    /// More contacts than planes; the deepest were kept.
-    pub const CONTACTS_TRUNCATED: Self = Self(1 << 8);
+    /// More contacts than planes; the deepest of each neighbourhood were kept.
+    pub const CONTACTS_THINNED: Self = Self(1 << 8);
     /// A fault happened in this tick or an earlier one: the command is zero until the session is made anew.
     pub const FAULT_LATCHED: Self = Self(1 << 9);
     /// No pass has delivered contacts yet.

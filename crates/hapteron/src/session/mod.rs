@@ -6,6 +6,7 @@
 
 mod contact_pass;
 mod flags;
+mod thinning;
 mod tick;
 mod virtual_time;
 

@@ -1,0 +1,121 @@
+//! What can be written on the command line.
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Six-degree-of-freedom haptic rendering: hold a rigid object and feel it touch a scene.
+#[derive(Debug, Parser)]
+#[command(name = "hapteron", version, max_term_width = 100)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Show it working: a built-in scene with a simulated hand, and a report
+    #[command(after_help = "Example:\n  hapteron demo --out my-demo\n")]
+    Demo(Demo),
+    /// Run a scene and write run.csv, scene.toml and report.html
+    #[command(after_help = RUN_EXAMPLES)]
+    Run(Run),
+    /// Contacts between two meshes at given poses of the first
+    #[command(after_help = QUERY_EXAMPLES)]
+    Query(Query),
+    /// Check and describe a mesh
+    #[command(
+        after_help = "Examples:\n  hapteron mesh part.stl\n  hapteron mesh part.stl --scale 0.001 --picture part.png\n"
+    )]
+    Mesh(Mesh),
+    /// Write the built-in meshes and scenes into a folder, to start one's own from
+    #[command(
+        after_help = "Example:\n  hapteron models my-models\n  hapteron run my-models/spoon_in_cup.toml --virtual-time\n"
+    )]
+    Models(Models),
+}
+
+const RUN_EXAMPLES: &str = "Examples:
+  hapteron run scene.toml --virtual-time
+  hapteron run scene.toml --virtual-time --replay hand.csv --out result
+  hapteron run scene.toml --virtual-time --set coupling.linear_stiffness=500 --set integrator.method=runge-kutta-4
+";
+
+const QUERY_EXAMPLES: &str = "Examples:
+  hapteron query body.obj obstacle.obj --poses poses.csv --tolerance 0.001
+  hapteron query body.stl obstacle.stl --poses poses.csv --tolerance 0.0002 --contacts contacts.csv --rate
+";
+
+/// `hapteron demo`
+#[derive(Args, Debug)]
+pub struct Demo {
+    /// Folder for the results [default: runs/demo, numbered when it exists]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// `hapteron run`
+#[derive(Args, Debug)]
+pub struct Run {
+    /// The scene (TOML)
+    #[arg(value_name = "SCENE.toml")]
+    pub scene: PathBuf,
+    /// Run on the deterministic schedule, as fast as the machine can (the only way until real devices are supported)
+    #[arg(long)]
+    pub virtual_time: bool,
+    /// Let the handle follow this motion exactly (t,px,py,pz,qw,qx,qy,qz) instead of the scene's hand
+    #[arg(long, value_name = "T.csv")]
+    pub replay: Option<PathBuf>,
+    /// Override a key of the scene, as in contact.stiffness=2000; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+    /// Folder for the results [default: runs/NAME, numbered when it exists]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// `hapteron query`
+#[derive(Args, Debug)]
+pub struct Query {
+    /// The mesh that moves (OBJ, STL, PLY or OFF)
+    #[arg(value_name = "A")]
+    pub body: PathBuf,
+    /// The mesh that stays
+    #[arg(value_name = "B")]
+    pub obstacle: PathBuf,
+    /// Poses of A's mesh frame in B's (CSV: t,px,py,pz,qw,qx,qy,qz; metres, unit quaternion)
+    #[arg(long, value_name = "P.csv")]
+    pub poses: PathBuf,
+    /// Surfaces closer than this are in contact, metres
+    #[arg(long, value_name = "D")]
+    pub tolerance: f64,
+    /// Write every contact into this file (CSV; world frame)
+    #[arg(long, value_name = "C.csv")]
+    pub contacts: Option<PathBuf>,
+    /// Metres per unit of both meshes
+    #[arg(long, default_value_t = 1.0, value_name = "S")]
+    pub scale: f64,
+    /// Tell on stderr how long the queries took
+    #[arg(long)]
+    pub rate: bool,
+}
+
+/// `hapteron mesh`
+#[derive(Args, Debug)]
+pub struct Mesh {
+    /// The mesh (OBJ, STL, PLY or OFF), or builtin:NAME
+    #[arg(value_name = "FILE")]
+    pub file: String,
+    /// Metres per unit of the mesh
+    #[arg(long, default_value_t = 1.0, value_name = "S")]
+    pub scale: f64,
+}
+
+/// `hapteron models`
+#[derive(Args, Debug)]
+pub struct Models {
+    /// The folder, made when it does not exist
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+}

@@ -1,0 +1,7 @@
+//! The commands, one file each.
+
+pub mod demo;
+pub mod mesh;
+pub mod models;
+pub mod query;
+pub mod run;

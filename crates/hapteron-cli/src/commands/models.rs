@@ -1,0 +1,23 @@
+//! `hapteron models`: the built-in meshes and scenes as files.
+
+use crate::arguments::Models;
+use anyhow::{Context, Result};
+use hapteron::assets;
+use std::process::ExitCode;
+
+/// Runs the command.
+pub fn models(arguments: &Models) -> Result<ExitCode> {
+    let folder = &arguments.folder;
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    for name in assets::BUILTIN_NAMES {
+        let mesh = assets::builtin(name)?;
+        let path = folder.join(format!("{name}.obj"));
+        let write = || -> std::io::Result<()> {
+            assets::write_obj(&mesh, name, std::io::BufWriter::new(std::fs::File::create(&path)?))
+        };
+        write().with_context(|| format!("cannot write {}", path.display()))?;
+        println!("{}  {} triangles", path.display(), mesh.triangles().len());
+    }
+    Ok(ExitCode::SUCCESS)
+}
