@@ -1,6 +1,6 @@
 //! What can be written on the command line.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
 /// Six-degree-of-freedom haptic rendering: hold a rigid object and feel it touch a scene.
@@ -21,6 +21,9 @@ pub enum Command {
     /// Run a scene and write run.csv, scene.toml and report.html
     #[command(after_help = RUN_EXAMPLES)]
     Run(Run),
+    /// The paper's experiments in virtual time: paper, measured, holds
+    #[command(after_help = "Examples:\n  hapteron reproduce\n  hapteron reproduce fig2 fig6 --out figures\n")]
+    Reproduce(Reproduce),
     /// Contacts between two meshes at given poses of the first
     #[command(after_help = QUERY_EXAMPLES)]
     Query(Query),
@@ -118,4 +121,26 @@ pub struct Models {
     /// The folder, made when it does not exist
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
+}
+
+/// `hapteron reproduce`
+#[derive(Args, Debug)]
+pub struct Reproduce {
+    /// Which figures of the paper [default: all]
+    #[arg(value_enum, value_name = "FIGURE")]
+    pub figures: Vec<Figure>,
+    /// Folder for the results [default: runs/reproduce, numbered when it exists]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// An experiment of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Figure {
+    /// The spoon in free space: integrators and masses
+    Fig2,
+    /// The spoon in the cup: contact
+    Fig4,
+    /// The jaws: the linearized contact model and slow contact threads
+    Fig6,
 }

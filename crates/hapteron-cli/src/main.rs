@@ -16,6 +16,7 @@ fn main() -> ExitCode {
     let outcome = match arguments.command {
         Command::Demo(a) => commands::demo::demo(&a),
         Command::Run(a) => commands::run::run(&a),
+        Command::Reproduce(a) => commands::reproduce::reproduce(&a),
         Command::Query(a) => commands::query::query(&a),
         Command::Mesh(a) => commands::mesh::mesh(&a),
         Command::Models(a) => commands::models::models(&a),

@@ -8,6 +8,7 @@ pub mod assets;
 pub mod motion;
 pub mod recording;
 pub mod scene;
+pub mod scenes;
 pub mod session;
 pub mod trajectory;
 

@@ -138,21 +138,48 @@ impl WayPoints {
 }
 
 /// Motions that [`builtin`] knows.
-pub const BUILTIN_NAMES: [&str; 1] = ["free-space"];
+pub const BUILTIN_NAMES: [&str; 2] = ["free-space", "spoon-in-cup"];
 
-/// A built-in motion by its name, at every `dt`, where it is made (near the origin).
+/// A built-in motion by its name, at every `dt`, in the world of the built-in scene that uses it.
 ///
 /// # Errors
 /// A name that is not among [`BUILTIN_NAMES`], or a time step longer than the motion.
 pub fn builtin(name: &str, dt: f64) -> Result<Trajectory, TrajectoryError> {
     match name {
         "free-space" => FREE_SPACE.trajectory(dt, &Isometry3::identity()),
+        "spoon-in-cup" => {
+            let (motion, world_from_motion) = spoon_in_cup();
+            motion.trajectory(dt, &world_from_motion)
+        }
         _ => Err(TrajectoryError {
             file: format!("builtin:{name}"),
             line: None,
             problem: format!("no built-in motion has this name; there are {}", BUILTIN_NAMES.join(", ")),
         }),
     }
+}
+
+/// The hand of Fig. 4: 650 ms in the frame of the spoon put through the cup's handle. For 130 ms it slides freely along the spoon, as fast
+/// as in free space; then it presses the spoon's handle against the grip of the cup, with about 3.5 N at most.
+fn spoon_in_cup() -> (WayPoints, Isometry3<f64>) {
+    let mut channels: [Vec<(f64, f64)>; 6] = Default::default();
+    channels[0] = vec![(0.0, 0.0), (0.13, 0.035)];
+    channels[1] = vec![(0.06, 0.0), (0.30, -0.027), (0.42, -0.023), (0.56, -0.027)];
+    channels[2] = vec![(0.25, 0.0), (0.40, 0.010), (0.60, -0.008)];
+    channels[5] = vec![(0.10, 0.0), (0.30, 0.08), (0.50, -0.08)];
+    // The spoon's x (along it) in the direction of the opening, its z up; at the start its handle is in the middle of the opening
+    // at 40 mm from the centre of mass.
+    let rotation = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(
+        std::f64::consts::FRAC_1_SQRT_2,
+        0.0,
+        0.0,
+        std::f64::consts::FRAC_1_SQRT_2,
+    ));
+    let in_opening = Vector3::new(0.040, 0.0, 0.0115);
+    let centre = Vector3::from(crate::assets::OPENING.centre);
+    let grip = Vector3::from(crate::scenes::SPOON_GRIP);
+    let origin = centre + rotation * (grip - in_opening);
+    (WayPoints { channels, duration: 0.65 }, Isometry3::from_parts(origin.into(), rotation))
 }
 
 fn between(points: &[(f64, f64)], t: f64) -> f64 {
@@ -202,7 +229,7 @@ mod tests {
     #[test]
     fn way_points_are_met_and_left_smoothly() {
         let mut channels: [Vec<(f64, f64)>; 6] = Default::default();
-        channels[1] = vec![(0.0, 0.0), (0.2, 0.0195), (0.4, -0.0195), (0.6, 0.0)];
+        channels[1] = vec![(0.06, 0.0), (0.30, -0.027), (0.42, -0.023), (0.56, -0.027)];
         let motion = WayPoints { channels, duration: 0.65 };
         let y = |t| motion.at(t).pose.translation.vector.y;
         assert_eq!(y(0.2), 0.0195);

@@ -4,4 +4,5 @@ pub mod demo;
 pub mod mesh;
 pub mod models;
 pub mod query;
+pub mod reproduce;
 pub mod run;

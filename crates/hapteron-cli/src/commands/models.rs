@@ -2,7 +2,7 @@
 
 use crate::arguments::Models;
 use anyhow::{Context, Result};
-use hapteron::assets;
+use hapteron::{assets, scenes};
 use std::process::ExitCode;
 
 /// Runs the command.
@@ -18,6 +18,13 @@ pub fn models(arguments: &Models) -> Result<ExitCode> {
         };
         write().with_context(|| format!("cannot write {}", path.display()))?;
         println!("{}  {} triangles", path.display(), mesh.triangles().len());
+    }
+    for name in scenes::NAMES {
+        let Some(scene) = scenes::builtin(name) else { continue };
+        let path = folder.join(format!("{name}.toml"));
+        let text = format!("# hapteron run {} --virtual-time\n{}", path.display(), scene.to_toml()?);
+        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        println!("{}", path.display());
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -148,14 +148,9 @@ impl Scene {
     /// The scene with every value written out.
     ///
     /// # Errors
-    /// None in practice: a value that TOML cannot hold.
+    /// As [`SceneFile::to_toml`].
     pub fn to_toml(&self) -> Result<String, SceneError> {
-        toml::to_string(&self.file).map_err(|e| SceneError {
-            file: self.name().to_owned(),
-            line: None,
-            key: None,
-            problem: e.to_string(),
-        })
+        self.file.to_toml()
     }
 
     /// The scene's title.
@@ -175,6 +170,17 @@ impl Scene {
     pub fn world_from_mesh(&self, state: &State) -> Isometry3<f64> {
         let rotation = state.unit_quaternion();
         Isometry3::from_parts((state.position - rotation * self.center_of_mass).into(), rotation)
+    }
+}
+
+impl SceneFile {
+    /// As it is read.
+    ///
+    /// # Errors
+    /// None in practice: a value that TOML cannot hold.
+    pub fn to_toml(&self) -> Result<String, SceneError> {
+        let file = self.scene.name.clone().unwrap_or_default();
+        toml::to_string(self).map_err(|e| SceneError { file, line: None, key: None, problem: e.to_string() })
     }
 }
 

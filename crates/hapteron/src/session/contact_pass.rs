@@ -171,17 +171,16 @@ impl ContactPass {
             let plane = ContactPlane::new(point_b, on_obstacle, normal, stiffness, damping, tolerance);
             self.candidates.push((depth, plane));
         };
-        match &mut self.clusterer {
-            Some(clusterer) => {
-                for c in clusterer.update(&self.contacts, reach, &world_from_mesh) {
-                    add(&c.point_body, &c.point_obstacle, c.normal, c.depth);
-                }
+        let d = settings.tolerance;
+        if let Some(clusterer) = &mut self.clusterer {
+            // What is beyond d has no weight in a cluster; it stays a plane of its own, or a far one would hold a near one off.
+            for c in clusterer.update(&self.contacts, d, &world_from_mesh) {
+                add(&c.point_body, &c.point_obstacle, c.normal, c.depth);
             }
-            None => {
-                for c in &self.contacts {
-                    add(&c.point_body, &c.point_obstacle, c.normal, c.depth);
-                }
-            }
+        }
+        let alone = |c: &&Contact| settings.max_clusters == 0 || c.depth <= -d;
+        for c in self.contacts.iter().filter(alone) {
+            add(&c.point_body, &c.point_obstacle, c.normal, c.depth);
         }
         let thinned = thin(&mut self.candidates, scene.model.surface.radius(), MAX_PLANES);
         snapshot.fill(&self.candidates, thinned, &scene.body, state, settings.model);
@@ -207,12 +206,9 @@ impl ContactPass {
 
     /// How far beyond d contacts are looked for, metres: as far as a point of the body can come until the pass after this one takes over.
     ///
-    /// Only planes, which never pull, may be known ahead of touch.
+    /// Only planes, which never pull, make use of what is beyond d; the other models are given the same query, for equal depths.
     fn margin(&self, scene: &Scene, state: &State, handle_speed: f64) -> f64 {
         let settings = &scene.contact;
-        if settings.model != ContactModel::Planes {
-            return 0.0;
-        }
         if let Some(metres) = settings.anticipation {
             return metres;
         }
