@@ -8,6 +8,10 @@ use crate::wrench::Wrench;
 use nalgebra::{Matrix3, RealField, Vector3, Vector6, convert};
 
 /// A contact as a planar constraint: a point of the body that a plane of the scene holds back.  Eq. 21.
+///
+/// Requires finite numbers, a unit normal, and stiffness, damping and tolerance that are not negative. Nothing checks them here,
+/// thousands of planes a millisecond; a plane with a number that is not finite makes [`crate::step`] report
+/// [`crate::Status::NON_FINITE`] instead of being passed over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactPlane {
     /// r: the contact point in the body frame, from the centre of mass, metres.
@@ -36,7 +40,9 @@ struct Reach<T> {
 }
 
 impl ContactPlane {
-    /// A plane through `point_w` (p0).
+    /// A plane through `point_w` (p0; world, metres); the other arguments are the fields.
+    ///
+    /// Never fails; what it requires stands with the type. Real time: constant work.
     #[must_use]
     pub fn new(
         point_b: Vector3<f64>,
@@ -68,6 +74,8 @@ impl ContactPlane {
     /// The wrench of this plane on the body at its centre of mass.  Eq. 21 with the arm R r (D4).
     ///
     /// With `clamp` it acts only within the tolerance and never pulls (D5); without, as printed. World axes, N and N m.
+    /// `inverse_mass` is 1/m in 1/kg, `inverse_inertia_b` the paper's M^-1 in body axes, 1/(kg m^2). Generic, so that it can be
+    /// differentiated automatically. Requires a quaternion that is not zero. Real time: constant work.
     pub fn wrench<T: RealField + Copy>(
         &self,
         state: &State<T>,
@@ -114,7 +122,7 @@ pub(crate) struct Change {
 }
 
 /// Adds the planes that push. A plane counts when it is within its tolerance and pushes: at the start of the step, or,
-/// given the change over the step, at its end. Returns how many count.
+/// given the change over the step, at its end (D8). Returns a signature of the set that counts.
 pub(crate) fn add_planes(
     planes: &[ContactPlane],
     state: &State,
@@ -149,12 +157,12 @@ pub(crate) fn add_planes(
     signature
 }
 
-/// The wrench of all planes that push at a state.
+/// The wrench of all planes that push at a state. A plane that is not finite makes the sum not finite: it is not passed over.
 pub(crate) fn planes_wrench(planes: &[ContactPlane], state: &State, motion: &Motion) -> Wrench {
     let mut sum = Wrench::zero();
     for plane in planes {
         let reach = plane.reach(&state.position, &motion.rotation, &motion.v, &motion.omega);
-        if reach.gap > 0.0 && reach.push > 0.0 {
+        if !(reach.gap <= 0.0 || reach.push <= 0.0) {
             sum = sum + Wrench::at(&reach.arm, plane.normal_w * -reach.push);
         }
     }
@@ -162,18 +170,22 @@ pub(crate) fn planes_wrench(planes: &[ContactPlane], state: &State, motion: &Mot
 }
 
 /// Contact force and torque as they were at a state, with their Jacobian: the linearized contact model.  Eq. 30.
+///
+/// World axes; N and N m at the centre of mass; the Jacobian by x (m), q, P (kg m/s), L (kg m^2/s).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearizedContact {
     /// F_p(t) over T_p(t), world, at the centre of mass.
     pub wrench: Vector6<f64>,
-    /// By the state.
+    /// Its derivative by the state: Eqs. 22 to 29, summed over the planes.
     pub jacobian: StateJacobian,
     /// y(t), from which the wrench is extrapolated.
     pub state: State,
 }
 
 impl LinearizedContact {
-    /// From the planes that are within their tolerance and push at the state.
+    /// From the planes that are within their tolerance and push at the state.  Eqs. 21 to 29, clamped (D5).
+    ///
+    /// Never fails. Real time: work in proportion to the planes; made for the contact thread.
     #[must_use]
     pub fn from_planes(planes: &[ContactPlane], body: &RigidBody, state: &State) -> Self {
         let motion = Motion::of(state, body);
@@ -184,7 +196,8 @@ impl LinearizedContact {
 
     /// The wrench at another state.  Eq. 30.
     ///
-    /// The quaternion enters as a vector, so it is taken from the hemisphere of the snapshot's (D6).
+    /// World axes, N over N m, at the centre of mass. The quaternion enters as a vector, so it is taken from the hemisphere of
+    /// the snapshot's (D6). It may pull: that is Eq. 30 as printed. Real time: constant work.
     #[must_use]
     pub fn wrench_at(&self, state: &State) -> Vector6<f64> {
         let mut y = *state;
@@ -219,7 +232,9 @@ pub enum ContactForce<'a> {
 }
 
 impl ContactForce<'_> {
-    /// The wrench at a state.
+    /// The wrench on the body at its centre of mass: Eq. 21 summed and clamped, Eq. 30, or the held value.
+    ///
+    /// World axes, N and N m. Requires a quaternion that is not zero. Real time: work in proportion to the planes.
     #[must_use]
     pub fn wrench(&self, state: &State, body: &RigidBody) -> Wrench {
         match self {

@@ -10,7 +10,7 @@ use crate::state::State;
 use crate::wrench::Wrench;
 use nalgebra::{Matrix3, RealField, UnitQuaternion, Vector3, Vector4, convert};
 
-/// The handle as the body sees it: pose and velocity in the virtual world, at the time of the step's end.
+/// The handle as the body sees it: pose and velocity in the virtual world, at the time of the step's end (D7).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Handle {
     /// x_h, world, metres.
@@ -43,6 +43,10 @@ pub enum CouplingError {
     Negative(&'static str, f64),
     /// A limit is not positive and finite: its name and value.
     Limit(&'static str, f64),
+    /// A component of the grasp is not finite: which one, and its value.
+    NotFinite(&'static str, f64),
+    /// The grasp's orientation is not a unit quaternion: its length.
+    NotUnit(f64),
 }
 
 impl core::fmt::Display for CouplingError {
@@ -50,13 +54,18 @@ impl core::fmt::Display for CouplingError {
         match self {
             Self::Negative(name, value) => write!(f, "{name} is {value}; it must be finite and not negative"),
             Self::Limit(name, value) => write!(f, "{name} is {value}; it must be positive and finite"),
+            Self::NotFinite(name, value) => write!(f, "{name} has the component {value}; it must be finite"),
+            Self::NotUnit(length) => write!(f, "grasp_orientation has the length {length}; it must be 1"),
         }
     }
 }
 
 impl core::error::Error for CouplingError {}
 
-/// The viscoelastic six-degree-of-freedom link between handle and body.
+/// The viscoelastic six-degree-of-freedom link between handle and body.  Section 5.
+///
+/// It acts between the handle's point x_h and the coupling point x + R c, which were one when the body was grasped, and between
+/// the handle's orientation q_h and that of the coupling frame, q q_c.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coupling {
     /// k_c with its greatest force.
@@ -73,7 +82,7 @@ pub struct Coupling {
     grasp_orientation_b: UnitQuaternion<f64>,
 }
 
-/// Least share of the damping that is left where the spring is saturated.
+/// Least share of the damping that is left where the spring is saturated (D10).
 const LEAST_DAMPING: f64 = 0.2;
 
 /// Where the coupling point stands to the handle.
@@ -112,10 +121,13 @@ fn spring<T: RealField + Copy>(spring: &Spring, deflection: &Vector3<T>) -> (Vec
 }
 
 impl Coupling {
-    /// A coupling at the given grasp.
+    /// A coupling at the given grasp: c (body frame, from the centre of mass, metres) and q_c (coupling frame to body frame).
+    ///
+    /// Damping in N s/m and N m s/rad. A spring with a limit bends over to it (section 5.3.1, D10).
     ///
     /// # Errors
-    /// Stiffness and damping must be finite and not negative, limits positive.
+    /// [`CouplingError`]: stiffness and damping must be finite and not negative, limits positive and finite, the grasp finite and its
+    /// orientation a unit quaternion.
     pub fn new(
         linear: Spring,
         linear_damping: f64,
@@ -141,7 +153,15 @@ impl Coupling {
             }
         }
         if let Some(&value) = grasp_position_b.iter().find(|c| !c.is_finite()) {
-            return Err(CouplingError::Limit("grasp_position", value));
+            return Err(CouplingError::NotFinite("grasp_position", value));
+        }
+        let q = &grasp_orientation_b.coords;
+        if let Some(&value) = q.iter().find(|c| !c.is_finite()) {
+            return Err(CouplingError::NotFinite("grasp_orientation", value));
+        }
+        let length = libm::sqrt(q.norm_squared());
+        if !((length - 1.0).abs() < 1e-6) {
+            return Err(CouplingError::NotUnit(length));
         }
         Ok(Self { linear, angular, linear_damping, angular_damping, grasp_position_b, grasp_orientation_b })
     }
@@ -190,7 +210,8 @@ impl Coupling {
 
     /// The wrench of the coupling on the body at its centre of mass.  Eq. 12, with the lever R c in the damper (D2).
     ///
-    /// World axes, N and N m. Real time: constant work.
+    /// World axes, N and N m. `inverse_mass` is 1/m in 1/kg, `inverse_inertia_b` the paper's M^-1 in body axes, 1/(kg m^2). Generic,
+    /// so that it can be differentiated automatically. Requires quaternions that are not zero. Real time: constant work.
     pub fn wrench<T: RealField + Copy>(
         &self,
         handle: &Handle,
@@ -207,7 +228,10 @@ impl Coupling {
     }
 
     /// What a device is sent: the opposite of the coupling's force, and of its torque without the lever of the force,
-    /// which acts about the body's centre of mass and not about the handle (D3). Also the length of e and of u_c.
+    /// which acts about the body's centre of mass and not about the handle (D3). Also the length of e = x_h - x - R c (metres) and of
+    /// u_c (radians, at most pi). Section 5.3.
+    ///
+    /// World axes, N and N m, before [`Coupling::limited`]. Real time: constant work.
     #[must_use]
     pub fn feedback(&self, handle: &Handle, state: &State, body: &RigidBody) -> (Wrench, f64, f64) {
         let v = state.linear_velocity(body);
@@ -217,7 +241,8 @@ impl Coupling {
         (Wrench { force: -force, torque: -torque }, length(&deviation.offset), length(&deviation.turn))
     }
 
-    /// Brings a wrench to the greatest force and torque, keeping directions; tells whether it had to.
+    /// Brings a wrench (N, N m) to the greatest force and torque, keeping directions; tells whether it had to (D10). Without
+    /// limits it stays. Real time: constant work.
     #[must_use]
     pub fn limited(&self, wrench: Wrench) -> (Wrench, bool) {
         let limit = |v: Vector3<f64>, limit: Option<f64>| match limit {
@@ -229,13 +254,16 @@ impl Coupling {
         (Wrench { force, torque }, forced || twisted)
     }
 
-    /// Whether a deviation of this length and angle is in the constant range of either spring.
+    /// Whether a deviation of this length (metres) and angle (radians) is in the constant range of either spring.
     #[must_use]
     pub fn is_saturated(&self, length: f64, angle: f64) -> bool {
         self.linear.is_saturated(length) || self.angular.is_saturated(angle)
     }
 
-    /// Adds the wrench and its derivatives.  Eqs. 12 to 20, by small changes of position, orientation and velocities.
+    /// Adds the wrench and its derivatives.  Eqs. 12 to 20 (D2), by small changes of position, orientation and velocities.
+    ///
+    /// `v` (m/s) and `omega` (rad/s) are the body's at `state`, world axes; [`Linearization::by_state`] makes the blocks of the paper
+    /// of the sum. At a coupling angle of pi, where u_c jumps, the derivative is that of one side. Real time: constant work.
     pub fn linearize(
         &self,
         handle: &Handle,

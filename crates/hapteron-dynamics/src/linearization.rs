@@ -24,13 +24,15 @@ pub struct Linearization {
 }
 
 impl Linearization {
-    /// No force.
+    /// No force, to which forces are added. Real time: constant work.
     #[must_use]
     pub fn zero() -> Self {
         Self { wrench: Vector6::zeros(), by_position: Matrix6::zeros(), by_velocity: Matrix6::zeros() }
     }
 
-    /// The Jacobian by the state: the blocks of Eqs. 13 to 20 and 22 to 29.
+    /// The Jacobian by the state: the blocks of Eqs. 13 to 20 and 22 to 29, rows F and T, columns x, q, P, L.
+    ///
+    /// `motion` must be that of the state at which the forces were added. Real time: constant work.
     #[must_use]
     pub fn by_state(&self, motion: &Motion) -> StateJacobian {
         let mut j = StateJacobian::zeros();
@@ -48,24 +50,27 @@ impl Linearization {
 /// What the forces and the linear systems need to know about a state.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
-    /// R.
+    /// R, body axes to world axes.
     pub rotation: Matrix3<f64>,
-    /// v, world.
+    /// v of the centre of mass, world, m/s.
     pub v: Vector3<f64>,
-    /// omega, world.
+    /// omega, world axes, rad/s.  Eq. 3.
     pub omega: Vector3<f64>,
-    /// 1/m.
+    /// 1/m, 1/kg.
     pub inverse_mass: f64,
-    /// R M^-1 R^T.
+    /// R M^-1 R^T, world axes, 1/(kg m^2).
     pub inverse_inertia_w: Matrix3<f64>,
-    /// The derivative of omega by a turn.
+    /// The derivative of omega by a turn (rotation vector, world axes), 1/s.  Eq. 11 without its factor G.
     pub omega_by_turn: Matrix3<f64>,
-    /// G: the turn for a change of q.
+    /// G: the turn for a change of q (rotation vector, world axes).
     pub turn_by_q: nalgebra::Matrix3x4<f64>,
 }
 
 impl Motion {
     /// At a state.
+    ///
+    /// Requires a unit quaternion; its derivatives are wrong in proportion to the deviation of |q| from 1, its values are not.
+    /// Never fails. Real time: constant work.
     #[must_use]
     pub fn of(state: &State, body: &RigidBody) -> Self {
         let rotation = rotation(&state.orientation);

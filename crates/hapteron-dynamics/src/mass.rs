@@ -6,9 +6,9 @@ use nalgebra::Matrix3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum RigidBodyError {
-    /// The mass is not a positive finite number.
+    /// The mass (kg) is not a positive finite number, or so small that 1/m is none.
     Mass(f64),
-    /// The inertia is not symmetric.
+    /// The inertia is not symmetric, or has a component that is not finite.
     Asymmetric,
     /// The inertia has a principal moment that is not positive (the least one is given).
     NotPositive(f64),
@@ -48,24 +48,37 @@ impl RigidBody {
     /// A body of the given mass (kg) and inertia tensor about its centre of mass (kg m^2, body axes).
     ///
     /// # Errors
-    /// Values that no body has; the triangle inequality of the moments is allowed to fail by one part in a thousand.
+    /// [`RigidBodyError`] for values that no body has; the triangle inequality of the moments is allowed to fail by one part in a
+    /// thousand, for inertias that were rounded. Not real time: the eigenvalues are found by iteration.
     pub fn new(mass: f64, inertia_b: Matrix3<f64>) -> Result<Self, RigidBodyError> {
-        if !(mass > 0.0 && mass.is_finite()) {
+        if !(mass > 0.0 && mass.is_finite() && (1.0 / mass).is_finite()) {
             return Err(RigidBodyError::Mass(mass));
         }
-        let size = inertia_b.amax();
-        if !size.is_finite() || (inertia_b - inertia_b.transpose()).amax() > 1e-9 * size {
+        // Before any maximum, which would pass over a NaN, and any iteration, which would not end with one.
+        if !inertia_b.iter().all(|c| c.is_finite()) {
             return Err(RigidBodyError::Asymmetric);
         }
-        let mut moments = inertia_b.symmetric_eigenvalues();
-        moments.as_mut_slice().sort_unstable_by(f64::total_cmp);
-        if moments[0] <= 1e-12 * size || size == 0.0 {
-            return Err(RigidBodyError::NotPositive(moments[0]));
+        let size = inertia_b.amax();
+        if (inertia_b - inertia_b.transpose()).amax() > 1e-9 * size {
+            return Err(RigidBodyError::Asymmetric);
         }
-        if moments[2] > (moments[0] + moments[1]) * 1.001 {
+        if size == 0.0 {
+            return Err(RigidBodyError::NotPositive(0.0));
+        }
+        // In units of the largest component, so that no product overflows or vanishes.
+        let unit = inertia_b / size;
+        let moments = unit.symmetric_eigenvalues();
+        let (least, greatest) = (moments.min(), moments.max());
+        if !(least > 1e-12) {
+            return Err(RigidBodyError::NotPositive(least * size));
+        }
+        if greatest > (moments.sum() - greatest) * 1.001 {
             return Err(RigidBodyError::Triangle);
         }
-        let inverse_inertia_b = inertia_b.try_inverse().ok_or(RigidBodyError::NotPositive(moments[0]))?;
+        let inverse_inertia_b = unit.try_inverse().unwrap_or_default() / size;
+        if !(inverse_inertia_b.trace() > 0.0 && inverse_inertia_b.iter().all(|c| c.is_finite())) {
+            return Err(RigidBodyError::NotPositive(least * size));
+        }
         Ok(Self { mass, inertia_b, inverse_inertia_b })
     }
 
@@ -81,7 +94,7 @@ impl RigidBody {
         &self.inertia_b
     }
 
-    /// Its inverse.
+    /// Its inverse, body axes, 1/(kg m^2): the paper's M^-1.
     #[must_use]
     pub fn inverse_inertia_b(&self) -> &Matrix3<f64> {
         &self.inverse_inertia_b

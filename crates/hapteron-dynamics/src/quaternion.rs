@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix3, Matrix3x4, Matrix4, Matrix4x3, RealField, Vector3, Vector4};
 
-/// The matrix u* with u* v = u x v.  Eq. 1.
+/// The matrix u* with u* v = u x v, in the axes and units of u.  Eq. 1.
 #[inline]
 pub fn skew<T: RealField + Copy>(u: &Vector3<T>) -> Matrix3<T> {
     let zero = T::zero();
@@ -14,7 +14,8 @@ pub fn skew<T: RealField + Copy>(u: &Vector3<T>) -> Matrix3<T> {
 
 /// R(q/|q|): body axes to world axes.
 ///
-/// Requires a quaternion that is not zero.
+/// Requires a quaternion that is not zero (a zero one gives NaN). Does not change with the quaternion's length or sign (D1).
+/// Real time: constant work.
 #[inline]
 pub fn rotation<T: RealField + Copy>(q: &Vector4<T>) -> Matrix3<T> {
     let s = T::one() / q.norm_squared();
@@ -33,21 +34,25 @@ pub fn rotation<T: RealField + Copy>(q: &Vector4<T>) -> Matrix3<T> {
     ) * s
 }
 
-/// G, 3x4: a change dq of a unit quaternion turns the body by G dq (rotation vector, world axes).
+/// G, 3x4: a change dq of a unit quaternion turns the body by G dq (rotation vector, world axes, radians).
+///
+/// The inverse of Q on the tangent space: G Q = I, and G q = 0 (D1). Requires a unit quaternion.
 #[inline]
 #[must_use]
 pub fn turn_matrix(q: &Vector4<f64>) -> Matrix3x4<f64> {
     quaternion_rate_matrix(q).transpose() * 4.0
 }
 
-/// The derivative of R by the i-th component of a unit quaternion, i = 0 to 3 for w, x, y, z.
+/// The derivative of R(q/|q|) by the i-th component of a unit quaternion, i = 0 to 3 for w, x, y, z (greater i count as 3).
+///
+/// The factor dR/dq_i of Eqs. 11, 15, 16, 24 and 25. Requires a unit quaternion. Real time: constant work.
 #[must_use]
 pub fn rotation_derivative(q: &Vector4<f64>, i: usize) -> Matrix3<f64> {
     let turn: Vector3<f64> = turn_matrix(q).column(i.min(3)).into();
     skew(&turn) * rotation(q)
 }
 
-/// Q, 4x3: the quaternion's rate is Q omega, with omega in world axes.  Eq. 8.
+/// Q, 4x3: the quaternion's rate is Q omega, with omega in world axes, rad/s.  Eq. 8.
 #[inline]
 pub fn quaternion_rate_matrix<T: RealField + Copy>(q: &Vector4<T>) -> Matrix4x3<T> {
     let half = T::one() / (T::one() + T::one());
@@ -55,7 +60,10 @@ pub fn quaternion_rate_matrix<T: RealField + Copy>(q: &Vector4<T>) -> Matrix4x3<
     Matrix4x3::new(-x, -y, -z, w, z, -y, -z, w, x, y, -x, w)
 }
 
-/// omega = R M^-1 R^T L, world axes, rad/s; `inverse_inertia_b` is the paper's M^-1.  Eq. 3.
+/// omega = R M^-1 R^T L, world axes, rad/s.  Eq. 3.
+///
+/// `angular_momentum` in world axes, kg m^2/s; `inverse_inertia_b` is the paper's M^-1, body axes, 1/(kg m^2). Requires a
+/// quaternion that is not zero. Real time: constant work.
 #[inline]
 pub fn angular_velocity<T: RealField + Copy>(
     q: &Vector4<T>,
@@ -68,7 +76,7 @@ pub fn angular_velocity<T: RealField + Copy>(
 
 /// The derivative of omega by a small turn of the body (3x3, world rotation vector); times G it is Eq. 11.
 ///
-/// `inverse_inertia_w` is R M^-1 R^T.
+/// World axes: omega in rad/s, L in kg m^2/s, `inverse_inertia_w` = R M^-1 R^T in 1/(kg m^2). Real time: constant work.
 #[inline]
 #[must_use]
 pub fn angular_velocity_derivative(
@@ -81,7 +89,8 @@ pub fn angular_velocity_derivative(
 
 /// The derivative of the quaternion's rate by the quaternion, 4x4.  Eq. 10.
 ///
-/// `omega_by_turn` is [`angular_velocity_derivative`].
+/// `omega` in world axes, rad/s; `omega_by_turn` is [`angular_velocity_derivative`]. Requires a unit quaternion. Real time:
+/// constant work.
 #[inline]
 #[must_use]
 pub fn quaternion_rate_derivative(

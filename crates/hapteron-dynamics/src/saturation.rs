@@ -20,16 +20,19 @@ const BEND: f64 = 2.0;
 /// The force at a deflection, with its first two derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpringForce {
-    /// f(s).
+    /// f(s), N or N m.
     pub force: f64,
-    /// f'(s).
+    /// f'(s), N/m or N m/rad.
     pub slope: f64,
-    /// f''(s).
+    /// f''(s), N/m^2 or N m/rad^2; at the two joints that of one side.
     pub curvature: f64,
 }
 
 impl Spring {
-    /// The force at the deflection s >= 0.
+    /// The force at the deflection s >= 0 (metres or radians).  Section 5.3.1; method, section D.
+    ///
+    /// Its slope is continuous. Requires a stiffness that is not negative and a positive limit, as [`crate::Coupling::new`]
+    /// checks them; a spring of stiffness zero has no force at any deflection. Real time: constant work.
     #[inline]
     #[must_use]
     pub fn at(&self, s: f64) -> SpringForce {
@@ -55,9 +58,10 @@ impl Spring {
         }
     }
 
-    /// Whether the spring has reached its limit at the deflection s.
+    /// Whether the spring has reached its limit at the deflection s (metres or radians). Real time: constant work.
     #[must_use]
     pub fn is_saturated(&self, s: f64) -> bool {
-        self.limit.is_some() && self.at(s).slope <= 0.0
+        // A spring of stiffness zero has no slope either, but no force that could reach the limit.
+        self.limit.is_some() && self.stiffness > 0.0 && self.at(s).slope <= 0.0
     }
 }

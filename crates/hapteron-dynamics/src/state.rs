@@ -5,6 +5,8 @@ use crate::quaternion::angular_velocity;
 use nalgebra::{Quaternion, RealField, SVector, UnitQuaternion, Vector3, Vector4};
 
 /// The state y of a rigid body.  Eq. 2.
+///
+/// Generic in its numbers, so that forces can be differentiated automatically.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<T = f64> {
     /// x: the centre of mass, world, metres.
@@ -18,7 +20,9 @@ pub struct State<T = f64> {
 }
 
 impl State<f64> {
-    /// A state with the given velocities (world; m/s and rad/s).
+    /// A state with the given velocities (world axes; m/s of the centre of mass, and rad/s).
+    ///
+    /// `position` is that of the centre of mass (world, metres), `orientation` turns body axes into world axes. Never fails.
     #[must_use]
     pub fn moving(
         body: &RigidBody,
@@ -36,14 +40,14 @@ impl State<f64> {
         }
     }
 
-    /// The orientation as a unit quaternion.
+    /// The orientation as a unit quaternion, body to world. Requires one that is not zero (a zero one gives NaN).
     #[must_use]
     pub fn unit_quaternion(&self) -> UnitQuaternion<f64> {
         let q = &self.orientation;
         UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]))
     }
 
-    /// v = P / m, world, m/s.
+    /// v = P / m of the centre of mass, world, m/s.
     #[must_use]
     pub fn linear_velocity(&self, body: &RigidBody) -> Vector3<f64> {
         self.linear_momentum / body.mass()
@@ -74,7 +78,7 @@ impl<T: RealField + Copy> State<T> {
         y
     }
 
-    /// The state with the given components.
+    /// The state with the given components, in the order x, q, P, L. Does not normalise the quaternion.
     #[must_use]
     pub fn from_vector(y: &SVector<T, 13>) -> Self {
         Self {

@@ -7,7 +7,8 @@ pub struct Status(u32);
 impl Status {
     /// Nothing to say.
     pub const NONE: Self = Self(0);
-    /// A number came in or out that is not finite; the state was kept and all wrenches are zero.
+    /// A number came in or out that is not finite, the quaternion was zero, or the time step was not positive; the state was kept
+    /// and all wrenches are zero.
     pub const NON_FINITE: Self = Self(1);
     /// The linear system could not be solved; the state was kept and all wrenches are zero.
     pub const SINGULAR: Self = Self(1 << 1);
@@ -15,7 +16,7 @@ impl Status {
     pub const COUPLING_ANGLE_LIMIT: Self = Self(1 << 2);
     /// The coupling's spring is in its saturated range.
     pub const COUPLING_SATURATED: Self = Self(1 << 3);
-    /// The feedback was reduced to the coupling's greatest force or torque.
+    /// The feedback was reduced to the coupling's greatest force or torque (D10).
     pub const FEEDBACK_LIMITED: Self = Self(1 << 4);
 
     /// The union of both.

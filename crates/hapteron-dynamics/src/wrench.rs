@@ -31,7 +31,7 @@ impl<T: RealField + Copy> Wrench<T> {
         Self { force: Vector3::new(v[0], v[1], v[2]), torque: Vector3::new(v[3], v[4], v[5]) }
     }
 
-    /// The force with its torque about the origin when it acts at `arm`.
+    /// The wrench about a point of a force (N) that acts at `arm` (metres, from that point, in the force's axes).
     #[must_use]
     pub fn at(arm: &Vector3<T>, force: Vector3<T>) -> Self {
         Self { force, torque: arm.cross(&force) }

@@ -3,42 +3,12 @@
 
 mod common;
 
-use common::Random;
+use common::{METHODS, Random, ball, coupling, problem, still_handle};
 use hapteron_dynamics::reference::{condensed_solve, dense_solve};
 use hapteron_dynamics::{
-    ContactForce, ContactPlane, Coupling, Handle, Method, Problem, RigidBody, Spring, State, Status, step,
+    ContactForce, ContactPlane, Handle, LinearizedContact, Method, Problem, RigidBody, State, Status, step,
 };
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-
-const METHODS: [Method; 5] = [
-    Method::BackwardEuler,
-    Method::BackwardEulerNewton,
-    Method::RungeKutta4,
-    Method::ForwardEuler,
-    Method::QuasiStatic,
-];
-
-fn still_handle() -> Handle {
-    Handle {
-        position: Vector3::zeros(),
-        orientation: UnitQuaternion::identity(),
-        linear_velocity: Vector3::zeros(),
-        angular_velocity: Vector3::zeros(),
-    }
-}
-
-fn coupling(k: f64, b: f64, k_turn: f64, b_turn: f64) -> Coupling {
-    let spring = |stiffness| Spring { stiffness, limit: None };
-    Coupling::new(spring(k), b, spring(k_turn), b_turn, Vector3::zeros(), UnitQuaternion::identity()).unwrap()
-}
-
-fn ball(mass: f64) -> RigidBody {
-    RigidBody::new(mass, Matrix3::identity() * (mass * 1e-4)).unwrap()
-}
-
-fn problem<'a>(body: &'a RigidBody, coupling: &'a Coupling, handle: &'a Handle) -> Problem<'a> {
-    Problem { body, coupling, handle, contact: ContactForce::None, gravity: Vector3::zeros() }
-}
 
 #[test]
 fn condensed_and_full_system_agree() {
@@ -219,6 +189,7 @@ fn moving_the_world_moves_the_result() {
     }
 }
 
+/// Catches a place where q enters other than through R(q) and G(q): a sign, or hemispheres mixed in Eq. 30.
 #[test]
 fn quaternion_and_its_opposite_are_the_same_orientation() {
     let mut random = Random::new(14);
@@ -228,16 +199,22 @@ fn quaternion_and_its_opposite_are_the_same_orientation() {
         let handle = random.handle(&state);
         let coupling = random.coupling(false);
         let planes = [random.plane(&state)];
-        let problem =
-            Problem { contact: ContactForce::Planes(&planes), ..problem(&body, &coupling, &handle) };
+        let model = LinearizedContact::from_planes(&planes, &body, &state);
         let mut opposite = state;
         opposite.orientation = -opposite.orientation;
-        let (a, b) = (
-            step(&problem, &state, 1e-3, Method::BackwardEuler),
-            step(&problem, &opposite, 1e-3, Method::BackwardEuler),
-        );
-        assert!((a.state.orientation + b.state.orientation).norm() < 1e-12, "the hemisphere is kept");
-        assert!((a.feedback.force - b.feedback.force).norm() < 1e-9 * (1.0 + a.feedback.force.norm()));
+        for contact in
+            [ContactForce::Planes(&planes), ContactForce::Linearized(&model), ContactForce::Held(&model)]
+        {
+            let problem = Problem { contact, ..problem(&body, &coupling, &handle) };
+            for method in METHODS {
+                let a = step(&problem, &state, 1e-3, method);
+                let b = step(&problem, &opposite, 1e-3, method);
+                let apart = (a.state.orientation + b.state.orientation).norm();
+                assert!(apart < 1e-10, "{method:?}: the hemisphere is kept, or {apart:e}");
+                let force = a.feedback.force;
+                assert!((force - b.feedback.force).norm() < 1e-8 * (1.0 + force.norm()), "{method:?}");
+            }
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Semi-implicit and implicit Backward Euler (Eqs. 5 to 7), in the 13x13 form of the paper and condensed to 6x6.
 
 use super::Problem;
+use super::elimination::solve6;
 use crate::contact::{Change, ContactForce, add_planes};
 use crate::linearization::{Linearization, Motion, StateJacobian};
 use crate::quaternion::{quaternion_rate_derivative, quaternion_rate_matrix};
@@ -12,13 +13,15 @@ const NEWTON_TOLERANCE: f64 = 1e-12;
 const NEWTON_STEPS: usize = 8;
 
 /// The right side of the linear system: dt f for the semi-implicit step (Eq. 6), what is left of Eq. 5 for Newton's method.
+///
+/// World axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residual {
-    /// Rows of x.
+    /// Rows of x, metres.
     pub position: Vector3<f64>,
     /// Rows of q.
     pub orientation: Vector4<f64>,
-    /// Rows of P and L.
+    /// Rows of P and L, N s and N m s.
     pub momentum: Vector6<f64>,
 }
 
@@ -78,7 +81,7 @@ impl System {
         Residual { position: self.motion.v * dt, orientation: self.rate * dt, momentum: self.wrench * dt }
     }
 
-    /// Solves (I - dt J) dy = residual, condensed to the six momenta (method H.5); exact.
+    /// Solves (I - dt J) dy = residual, condensed to the six momenta (D11); exact.
     fn solve(&self, residual: &Residual, dt: f64) -> Option<SVector<f64, 13>> {
         let s = (Matrix4::identity() - self.rate_by_q * dt).try_inverse()?;
         let by_q: SMatrix<f64, 6, 4> = self.jacobian.fixed_columns::<4>(3).into();
@@ -129,41 +132,7 @@ impl System {
     }
 }
 
-/// Gaussian elimination with partial pivoting.
-fn solve6(mut a: Matrix6<f64>, mut b: Vector6<f64>) -> Option<Vector6<f64>> {
-    for column in 0..6 {
-        let mut pivot = column;
-        for row in column + 1..6 {
-            if a[(row, column)].abs() > a[(pivot, column)].abs() {
-                pivot = row;
-            }
-        }
-        if !(a[(pivot, column)].abs() > 0.0) {
-            return None;
-        }
-        if pivot != column {
-            a.swap_rows(pivot, column);
-            b.swap_rows(pivot, column);
-        }
-        let inverse = 1.0 / a[(column, column)];
-        for row in column + 1..6 {
-            let factor = a[(row, column)] * inverse;
-            for k in column + 1..6 {
-                a[(row, k)] -= factor * a[(column, k)];
-            }
-            b[row] -= factor * b[column];
-        }
-    }
-    for row in (0..6).rev() {
-        for k in row + 1..6 {
-            b[row] -= a[(row, k)] * b[k];
-        }
-        b[row] /= a[(row, row)];
-    }
-    Some(b)
-}
-
-/// One linearized step.  Eq. 6. Planes count when they push at its end: after a first solve the set is judged again, once.
+/// One linearized step.  Eq. 6. Planes count when they push at its end: after a first solve the set is judged again, once (D8).
 pub(super) fn step(problem: &Problem<'_>, state: &State, dt: f64) -> Option<State> {
     let system = System::at(problem, state, None);
     let mut dy = system.solve(&system.explicit_residual(dt), dt)?;
@@ -200,14 +169,19 @@ pub(super) fn newton_step(problem: &Problem<'_>, state: &State, dt: f64) -> Opti
     Some(State::from_vector(&y))
 }
 
-/// The increment of the semi-implicit step from the condensed system.
+/// The increment (x, q, P, L) of the semi-implicit step from the condensed system.  Eq. 6 by D11.
+///
+/// One solve, with the planes that push at `state`; the quaternion is not yet renormalised. `None` when the system is singular.
+/// Real time: work in proportion to the planes.
 #[must_use]
 pub fn condensed_solve(problem: &Problem<'_>, state: &State, dt: f64) -> Option<SVector<f64, 13>> {
     let system = System::at(problem, state, None);
     system.solve(&system.explicit_residual(dt), dt)
 }
 
-/// The increment of the semi-implicit step from the 13x13 system.
+/// The increment (x, q, P, L) of the semi-implicit step from the 13x13 system.  Eq. 6 as printed.
+///
+/// What [`condensed_solve`] is tested against. `None` when the system is singular. Not real time.
 #[must_use]
 pub fn dense_solve(problem: &Problem<'_>, state: &State, dt: f64) -> Option<SVector<f64, 13>> {
     let system = System::at(problem, state, None);

@@ -1,6 +1,7 @@
 //! The five integrators, and the step that a haptic tick makes.
 
 mod backward_euler;
+mod elimination;
 mod explicit;
 mod quasi_static;
 
@@ -19,15 +20,16 @@ use nalgebra::{SVector, Vector3};
 /// A numerical integration method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Semi-implicit Backward Euler: one linear solve (Eq. 6), and a second one when the first changes which planes push.
+    /// Semi-implicit Backward Euler: one linear solve (Eq. 6), and a second one when the first changes which planes push (D8).
     BackwardEuler,
     /// Implicit Backward Euler (Eq. 5) by Newton's method, at most eight solves.
     BackwardEulerNewton,
-    /// Explicit, fourth order.
+    /// Explicit, fourth order.  Section 7.2.
     RungeKutta4,
-    /// Explicit, first order.
+    /// Explicit, first order.  Section 7.2.
     ForwardEuler,
-    /// No inertia and no damping: the linearized balance of forces (Wan and McNeely 2003).
+    /// No inertia and no damping: the linearized balance of forces (Wan and McNeely 2003; D12). The time step plays no part; momenta
+    /// are zero afterwards. Needs a coupling with both stiffnesses.
     QuasiStatic,
 }
 
@@ -42,12 +44,14 @@ pub struct Problem<'a> {
     pub handle: &'a Handle,
     /// The contacts.
     pub contact: ContactForce<'a>,
-    /// World, m/s^2.
+    /// The acceleration of gravity, world, m/s^2.
     pub gravity: Vector3<f64>,
 }
 
 impl Problem<'_> {
-    /// The right side of the equations of motion, f(y).  Eqs. 2 and 4.
+    /// The right side of the equations of motion, f(y): the rates of x (m/s), q (1/s), P (N), L (N m), world.  Eqs. 2 and 4.
+    ///
+    /// Requires a unit quaternion. Real time: work in proportion to the planes.
     #[must_use]
     pub fn rate(&self, state: &State) -> SVector<f64, 13> {
         let motion = Motion::of(state, self.body);
@@ -70,11 +74,11 @@ impl Problem<'_> {
 pub struct Step {
     /// y_i.
     pub state: State,
-    /// The coupling's wrench on the body at its centre of mass, at y_i.
+    /// The coupling's wrench on the body at its centre of mass, at y_i, world, N and N m.  Eq. 12.
     pub coupling: Wrench,
-    /// What the device is sent, before scaling.
+    /// What the device is sent, before scaling: force and torque on the hand at the handle, world, N and N m (D3, D10).
     pub feedback: Wrench,
-    /// The contacts' wrench on the body at its centre of mass, at y_i.
+    /// The contacts' wrench on the body at its centre of mass, at y_i, world, N and N m.  Eq. 21 or 30.
     pub contact: Wrench,
     /// Coupling deviation |x_h - x_c|, metres.
     pub deviation: f64,
@@ -89,11 +93,16 @@ const ANGLE_LIMIT: f64 = 3.0;
 
 /// One step of `dt` seconds from `state` by the given method, and the wrenches at its end.
 ///
-/// Never returns a number that is not finite: when one comes in or out, or the system is singular, the state stays, all wrenches
-/// are zero and the status says so. Real time: bounded work in proportion to the planes, no allocation, no panic.
+/// Steps 2 to 5 of the haptic thread (section 3.1). Requires a unit quaternion, and keeps it one (D9): with |q| off by e the
+/// step is off by a share of about e.
+///
+/// Never returns a number that is not finite: when one comes in or out, the time step is not positive, or the system is singular, the
+/// state stays, all wrenches are zero and the status says so. Real time: bounded work in proportion to the planes, no allocation, no
+/// panic (`tests/panic_paths.rs` looks for one in the machine code).
 #[must_use]
 pub fn step(problem: &Problem<'_>, state: &State, dt: f64, method: Method) -> Step {
     let valid = state.is_finite()
+        && state.orientation.norm_squared() > 0.0
         && problem.handle.is_finite()
         && problem.gravity.iter().all(|c| c.is_finite())
         && dt > 0.0
@@ -119,7 +128,7 @@ fn failed(state: &State, status: Status) -> Step {
     Step { state: *state, coupling: zero, feedback: zero, contact: zero, deviation: 0.0, angle: 0.0, status }
 }
 
-/// Renormalises the quaternion and evaluates the wrenches at the new state.
+/// Renormalises the quaternion (D9) and evaluates the wrenches at the new state.
 fn finish(problem: &Problem<'_>, before: &State, mut state: State) -> Step {
     let length = libm::sqrt(state.orientation.norm_squared());
     if !(length > 0.0 && state.is_finite()) {

@@ -1,9 +1,11 @@
-//! The quasi-static approximation: each step goes to the linearized balance of coupling and contact (Wan and McNeely 2003).
+//! The quasi-static approximation: each step goes to the linearized balance of coupling and contact (Wan and McNeely 2003;
+//! section 8.1 of the paper; D12).
 
 use super::Problem;
+use super::elimination::solve6;
 use crate::contact::{ContactForce, add_planes};
 use crate::linearization::{Linearization, Motion};
-use crate::quaternion::{exponential, product};
+use crate::quaternion::{exponential, product, quaternion_rate_matrix};
 use crate::state::State;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
@@ -14,6 +16,7 @@ const LARGEST_TURN: f64 = 0.05;
 /// Added to the stiffness, as a share of the coupling's, so that the balance is unique.
 const REGULARISATION: f64 = 1e-6;
 
+/// One step towards the balance. `None` when it is not unique: a coupling without angular (or any) stiffness.
 pub(super) fn step(problem: &Problem<'_>, state: &State) -> Option<State> {
     let mut resting = *state;
     resting.linear_momentum = Vector3::zeros();
@@ -36,7 +39,7 @@ pub(super) fn step(problem: &Problem<'_>, state: &State) -> Option<State> {
             let mut left = sum.by_position.fixed_columns_mut::<3>(0);
             left += j.fixed_columns::<3>(0);
             // A turn changes q by Q times the turn.
-            let q_matrix = crate::quaternion::quaternion_rate_matrix(&resting.orientation);
+            let q_matrix = quaternion_rate_matrix(&resting.orientation);
             let mut right = sum.by_position.fixed_columns_mut::<3>(3);
             right += j.fixed_columns::<4>(3) * q_matrix;
         }
@@ -46,7 +49,7 @@ pub(super) fn step(problem: &Problem<'_>, state: &State) -> Option<State> {
     let (k, k_turn) = (problem.coupling.linear_stiffness(), problem.coupling.angular_stiffness());
     let regular = Vector6::new(k, k, k, k_turn, k_turn, k_turn) * REGULARISATION;
     let stiffness = Matrix6::from_diagonal(&regular) - sum.by_position;
-    let change = stiffness.lu().solve(&sum.wrench)?;
+    let change = solve6(stiffness, sum.wrench)?;
     let shorten = |v: Vector3<f64>, most: f64| {
         let length = libm::sqrt(v.norm_squared());
         if length > most { v * (most / length) } else { v }

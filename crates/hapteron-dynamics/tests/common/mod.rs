@@ -1,10 +1,59 @@
-//! Seeded random bodies, states and forces.
+//! Simple and seeded random bodies, states and forces.
 #![allow(dead_code)] // Each test file uses its share.
 
-use hapteron_dynamics::{ContactPlane, Coupling, Handle, RigidBody, Spring, State};
+use hapteron_dynamics::{
+    ContactForce, ContactPlane, Coupling, Handle, Method, Problem, RigidBody, Spring, State,
+};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rand::rngs::SmallRng;
 use rand::{Rng, SeedableRng};
+
+pub const METHODS: [Method; 5] = [
+    Method::BackwardEuler,
+    Method::BackwardEulerNewton,
+    Method::RungeKutta4,
+    Method::ForwardEuler,
+    Method::QuasiStatic,
+];
+
+pub fn still_handle() -> Handle {
+    Handle {
+        position: Vector3::zeros(),
+        orientation: UnitQuaternion::identity(),
+        linear_velocity: Vector3::zeros(),
+        angular_velocity: Vector3::zeros(),
+    }
+}
+
+pub fn coupling(k: f64, b: f64, k_turn: f64, b_turn: f64) -> Coupling {
+    let spring = |stiffness| Spring { stiffness, limit: None };
+    Coupling::new(spring(k), b, spring(k_turn), b_turn, Vector3::zeros(), UnitQuaternion::identity()).unwrap()
+}
+
+pub fn ball(mass: f64) -> RigidBody {
+    RigidBody::new(mass, Matrix3::identity() * (mass * 1e-4)).unwrap()
+}
+
+pub fn problem<'a>(body: &'a RigidBody, coupling: &'a Coupling, handle: &'a Handle) -> Problem<'a> {
+    Problem { body, coupling, handle, contact: ContactForce::None, gravity: Vector3::zeros() }
+}
+
+/// A body at rest at the origin, in the world's orientation.
+pub fn at_rest(body: &RigidBody) -> State {
+    let zero = Vector3::zeros();
+    State::moving(body, zero, &UnitQuaternion::identity(), &zero, &zero)
+}
+
+/// The spoon of the paper's Fig. 2 with its coupling, as `experiments.md` of the project completes them.
+pub fn spoon(mass: f64) -> (RigidBody, Coupling) {
+    let (xx, xz, yy, zz) = (1.05601e-4, -2.75931e-4, 3.723_482e-3, 3.751_521e-3);
+    let inertia = Matrix3::new(xx, 0.0, xz, 0.0, yy, 0.0, xz, 0.0, zz) * mass;
+    let spring = |stiffness| Spring { stiffness, limit: None };
+    let grip = Vector3::new(0.052_258, 0.0, 0.011_393);
+    let coupling =
+        Coupling::new(spring(200.0), 2.0, spring(0.6), 0.0166, grip, UnitQuaternion::identity()).unwrap();
+    (RigidBody::new(mass, inertia).unwrap(), coupling)
+}
 
 pub struct Random(SmallRng);
 
