@@ -229,7 +229,7 @@ mod tests {
     #[test]
     fn way_points_are_met_and_left_smoothly() {
         let mut channels: [Vec<(f64, f64)>; 6] = Default::default();
-        channels[1] = vec![(0.06, 0.0), (0.30, -0.027), (0.42, -0.023), (0.56, -0.027)];
+        channels[1] = vec![(0.0, 0.0), (0.2, 0.0195), (0.4, -0.0195), (0.6, 0.0)];
         let motion = WayPoints { channels, duration: 0.65 };
         let y = |t| motion.at(t).pose.translation.vector.y;
         assert_eq!(y(0.2), 0.0195);

@@ -1,4 +1,4 @@
-//! Motions of the handle, read from CSV (`t,px,py,pz,qw,qx,qy,qz` and optionally `vx,vy,vz,wx,wy,wz`).
+//! Motions of the handle, read from CSV (`t,px,py,pz,qw,qx,qy,qz` and optionally `vx,vy,vz,wx,wy,wz`), or from a `run.csv`.
 
 use hapteron_device::DeviceSample;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -42,7 +42,12 @@ pub fn read_poses(bytes: &[u8], name: &str) -> Result<Vec<PoseRow>, TrajectoryEr
     let fail = |line: Option<u64>, problem: String| TrajectoryError { file: name.to_owned(), line, problem };
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
     let header = reader.headers().map_err(|e| fail(None, e.to_string()))?.clone();
-    let column = |wanted: &str| header.iter().position(|h| h == wanted);
+    // A run.csv can be replayed: the handle's columns there have a prefix.
+    let find = |wanted: &str| header.iter().position(|h| h == wanted);
+    let recorded = find("px").is_none() && find("handle_px").is_some();
+    let column = |wanted: &str| {
+        if recorded && wanted != "t" { find(&format!("handle_{wanted}")) } else { find(wanted) }
+    };
     let mut columns = Vec::with_capacity(14);
     for wanted in POSE {
         let Some(index) = column(wanted) else {
