@@ -82,6 +82,14 @@ pub enum MeshProblem {
         /// The coordinate.
         value: f64,
     },
+    /// The same where the line tells which vertex.
+    #[error(
+        "the coordinate {value}; coordinates must be finite and at most 1e9, repair the mesh or set its scale"
+    )]
+    NotACoordinate {
+        /// The coordinate.
+        value: f64,
+    },
     /// An index beyond the vertices.
     #[error(
         "face {face} uses vertex {index}, but there are {vertices} vertices; repair or re-export the mesh"

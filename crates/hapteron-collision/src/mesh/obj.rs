@@ -45,7 +45,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
 
 fn vertex<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 3], MeshProblem> {
     let mut next = || match words.next() {
-        Some(word) => text::number(word, "a vertex coordinate"),
+        Some(word) => text::coordinate(word),
         None => Err(MeshProblem::Syntax("a vertex needs three coordinates".into())),
     };
     Ok([next()?, next()?, next()?])

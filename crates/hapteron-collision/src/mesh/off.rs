@@ -31,11 +31,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
         text::check_count("vertices", announced[0], words.remaining(), 6).map_err(|p| at(&words, p))?;
     let mut vertices = Vec::with_capacity(count);
     for _ in 0..count {
-        vertices.push([
-            words.number("a coordinate")?,
-            words.number("a coordinate")?,
-            words.number("a coordinate")?,
-        ]);
+        vertices.push([words.coordinate()?, words.coordinate()?, words.coordinate()?]);
         if extra == 1 {
             words.skip_line();
         }

@@ -92,11 +92,7 @@ fn text_facets(bytes: &[u8]) -> Result<Raw, MeshError> {
         };
         match word {
             "vertex" => {
-                let point = [
-                    words.number("a coordinate")?,
-                    words.number("a coordinate")?,
-                    words.number("a coordinate")?,
-                ];
+                let point = [words.coordinate()?, words.coordinate()?, words.coordinate()?];
                 corners.push(welder.index(point));
             }
             "endloop" => {

@@ -48,6 +48,12 @@ impl<'a> Words<'a> {
         number(word, what).map_err(|p| MeshError::at(line, p))
     }
 
+    /// A coordinate: a number that is finite and of a size that lengths have.
+    pub(super) fn coordinate(&mut self) -> Result<f64, MeshError> {
+        let (line, word) = self.next("a coordinate")?;
+        coordinate(word).map_err(|p| MeshError::at(line, p))
+    }
+
     pub(super) fn line(&self) -> usize {
         self.line
     }
@@ -67,6 +73,17 @@ impl<'a> Words<'a> {
 /// A number in a word.
 pub(super) fn number<T: std::str::FromStr>(word: &str, what: &'static str) -> Result<T, MeshProblem> {
     word.parse().map_err(|_| MeshProblem::NotANumber { what, found: word.chars().take(40).collect() })
+}
+
+/// A coordinate in a word; here, and not only when the mesh is made, so that the error can name the line.
+pub(super) fn coordinate(word: &str) -> Result<f64, MeshProblem> {
+    let value = number(word, "a coordinate")?;
+    if is_coordinate(value) { Ok(value) } else { Err(MeshProblem::NotACoordinate { value }) }
+}
+
+/// Whether a number can be a coordinate.
+pub(super) fn is_coordinate(value: f64) -> bool {
+    value.abs() <= super::LARGEST_COORDINATE
 }
 
 /// Refuses a count for which the rest of a file has no room, before anything is allocated for it.
