@@ -29,7 +29,7 @@ pub struct SpringForce {
 }
 
 impl Spring {
-    /// The force at the deflection s >= 0 (metres or radians).  Section 5.3.1; method, section D.
+    /// The force at the deflection s >= 0 (metres or radians).  Section 5.3.1 (D10).
     ///
     /// Its slope is continuous. Requires a stiffness that is not negative and a positive limit, as [`crate::Coupling::new`]
     /// checks them; a spring of stiffness zero has no force at any deflection. Real time: constant work.

@@ -44,7 +44,7 @@ pub fn at_rest(body: &RigidBody) -> State {
     State::moving(body, zero, &UnitQuaternion::identity(), &zero, &zero)
 }
 
-/// The spoon of the paper's Fig. 2 with its coupling, as `experiments.md` of the project completes them.
+/// The spoon of the paper's Fig. 2 with its coupling; damping and inertia, which the paper leaves out, are chosen to meet its figures.
 pub fn spoon(mass: f64) -> (RigidBody, Coupling) {
     let (xx, xz, yy, zz) = (1.05601e-4, -2.75931e-4, 3.723_482e-3, 3.751_521e-3);
     let inertia = Matrix3::new(xx, 0.0, xz, 0.0, yy, 0.0, xz, 0.0, zz) * mass;
