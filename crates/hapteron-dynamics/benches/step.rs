@@ -47,25 +47,26 @@ impl Case {
     }
 }
 
-#[divan::bench(args = [0, 8, 64, 1000, 4000])]
+#[divan::bench(args = [0, 8, 64, 1000, 4000], sample_count = 1000, sample_size = 20)]
 fn condensed_step(bencher: Bencher<'_, '_>, planes: usize) {
     let case = Case::new(planes);
     bencher.bench_local(|| condensed_solve(&case.problem(), black_box(&case.state), 1e-3));
 }
 
-#[divan::bench(args = [0, 8])]
+#[divan::bench(args = [0, 8], sample_count = 1000, sample_size = 20)]
 fn dense_13x13_step(bencher: Bencher<'_, '_>, planes: usize) {
     let case = Case::new(planes);
     bencher.bench_local(|| dense_solve(&case.problem(), black_box(&case.state), 1e-3));
 }
 
+/// With the wrenches at the end, and a second solve where the first changes which planes push (as it does here).
 #[divan::bench(args = [
     Method::BackwardEuler,
     Method::BackwardEulerNewton,
     Method::RungeKutta4,
     Method::ForwardEuler,
     Method::QuasiStatic,
-])]
+], sample_count = 1000, sample_size = 20)]
 fn whole_step_with_8_planes(bencher: Bencher<'_, '_>, method: Method) {
     let case = Case::new(8);
     bencher.bench_local(|| step(&case.problem(), black_box(&case.state), 1e-3, method));

@@ -8,6 +8,9 @@
 //! What never lives here: meshes and collision detection, devices, files, clocks, threads, memory allocation. Everything is
 //! plain arithmetic of bounded time on `f64`, without a panic, and so may be called from a haptic thread.
 //!
+//! Checked: `cargo build -p hapteron-dynamics --target thumbv7em-none-eabihf` (after `rustup target add` of it) builds where there is
+//! no std; `cargo test -p hapteron-dynamics --test panic_paths -- --ignored` looks for a panic or an allocation in the machine code.
+//!
 //! Frames: W world, B body (at its centre of mass), C coupling, H handle. A suffix names the frame in which a vector
 //! is expressed. SI units and radians. State order x, q (w, x, y, z), P, L.
 #![no_std]

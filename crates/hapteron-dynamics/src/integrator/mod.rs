@@ -22,7 +22,7 @@ use nalgebra::{SVector, Vector3};
 pub enum Method {
     /// Semi-implicit Backward Euler: one linear solve (Eq. 6), and a second one when the first changes which planes push (D8).
     BackwardEuler,
-    /// Implicit Backward Euler (Eq. 5) by Newton's method, at most eight solves.
+    /// Implicit Backward Euler (Eq. 5) by Newton's method, at most eight solves; what it has then is used.
     BackwardEulerNewton,
     /// Explicit, fourth order.  Section 7.2.
     RungeKutta4,
