@@ -121,8 +121,26 @@ pub(crate) struct Change {
     pub velocity: Vector6<f64>,
 }
 
-/// Adds the planes that push. A plane counts when it is within its tolerance and pushes: at the start of the step, or,
-/// given the change over the step, at its end (D8). Returns a signature of the set that counts.
+/// Whether a plane counts: it is within its tolerance and pushes, at the start of the step or, given the change over the step, at
+/// its end (D8).
+#[inline]
+fn counts(plane: &ContactPlane, reach: &Reach<f64>, end: Option<&Change>) -> bool {
+    let Some(change) = end else { return reach.gap > 0.0 && reach.push > 0.0 };
+    let (n, m) = (&plane.normal_w, reach.arm.cross(&plane.normal_w));
+    let along =
+        |v: &Vector6<f64>| n.x * v[0] + n.y * v[1] + n.z * v[2] + m.x * v[3] + m.y * v[4] + m.z * v[5];
+    let closing = along(&change.position);
+    let push = plane.stiffness * closing + plane.damping * along(&change.velocity);
+    reach.gap + closing > 0.0 && reach.push + push > 0.0
+}
+
+/// Order-dependent, so that different sets of planes have different signatures.
+#[inline]
+fn sign(signature: u64, index: usize) -> u64 {
+    signature.wrapping_mul(0x0000_0100_0000_01b3).wrapping_add(index as u64 + 1)
+}
+
+/// Adds the planes that count. Returns the signature of their set.
 pub(crate) fn add_planes(
     planes: &[ContactPlane],
     state: &State,
@@ -130,28 +148,24 @@ pub(crate) fn add_planes(
     end: Option<&Change>,
     to: &mut Linearization,
 ) -> u64 {
-    let mut signature = 0u64;
+    let mut signature = 0;
     for (index, plane) in planes.iter().enumerate() {
         let reach = plane.reach(&state.position, &motion.rotation, &motion.v, &motion.omega);
-        let (mut gap, mut push) = (reach.gap, reach.push);
-        if let Some(change) = end {
-            let m = reach.arm.cross(&plane.normal_w);
-            let along = |v: &Vector6<f64>| {
-                plane.normal_w.x * v[0]
-                    + plane.normal_w.y * v[1]
-                    + plane.normal_w.z * v[2]
-                    + m.x * v[3]
-                    + m.y * v[4]
-                    + m.z * v[5]
-            };
-            let closing = along(&change.position);
-            gap += closing;
-            push += plane.stiffness * closing + plane.damping * along(&change.velocity);
-        }
-        if gap > 0.0 && push > 0.0 {
+        if counts(plane, &reach, end) {
             plane.add(&reach, &motion.omega, to);
-            // Order-dependent, so that different sets of planes have different signatures.
-            signature = signature.wrapping_mul(0x0000_0100_0000_01b3).wrapping_add(index as u64 + 1);
+            signature = sign(signature, index);
+        }
+    }
+    signature
+}
+
+/// The signature of the set of planes that would count at the end of a step: that of [`add_planes`], without the adding.
+pub(crate) fn signature_at_end(planes: &[ContactPlane], state: &State, motion: &Motion, end: &Change) -> u64 {
+    let mut signature = 0;
+    for (index, plane) in planes.iter().enumerate() {
+        let reach = plane.reach(&state.position, &motion.rotation, &motion.v, &motion.omega);
+        if counts(plane, &reach, Some(end)) {
+            signature = sign(signature, index);
         }
     }
     signature

@@ -2,7 +2,7 @@
 
 use super::Problem;
 use super::elimination::solve6;
-use crate::contact::{Change, ContactForce, add_planes};
+use crate::contact::{Change, ContactForce, add_planes, signature_at_end};
 use crate::linearization::{Linearization, Motion, StateJacobian};
 use crate::quaternion::{quaternion_rate_derivative, quaternion_rate_matrix};
 use crate::state::State;
@@ -136,9 +136,10 @@ impl System {
 pub(super) fn step(problem: &Problem<'_>, state: &State, dt: f64) -> Option<State> {
     let system = System::at(problem, state, None);
     let mut dy = system.solve(&system.explicit_residual(dt), dt)?;
-    if matches!(problem.contact, ContactForce::Planes(planes) if !planes.is_empty()) {
-        let again = System::at(problem, state, Some(&system.change(&dy)));
-        if again.signature != system.signature {
+    if let ContactForce::Planes(planes) = problem.contact {
+        let end = system.change(&dy);
+        if signature_at_end(planes, state, &system.motion, &end) != system.signature {
+            let again = System::at(problem, state, Some(&end));
             dy = again.solve(&again.explicit_residual(dt), dt)?;
         }
     }

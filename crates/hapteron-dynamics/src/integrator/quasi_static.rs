@@ -3,7 +3,7 @@
 
 use super::Problem;
 use super::elimination::solve6;
-use crate::contact::{Change, ContactForce, add_planes};
+use crate::contact::{Change, ContactForce, add_planes, signature_at_end};
 use crate::linearization::{Linearization, Motion};
 use crate::quaternion::{exponential, product, quaternion_rate_matrix};
 use crate::state::State;
@@ -25,11 +25,10 @@ pub(super) fn step(problem: &Problem<'_>, state: &State) -> Option<State> {
     resting.angular_momentum = Vector3::zeros();
     let motion = Motion::of(&resting, problem.body);
     let (mut change, signature) = balance(problem, &resting, &motion, None)?;
-    if matches!(problem.contact, ContactForce::Planes(planes) if !planes.is_empty()) {
+    if let ContactForce::Planes(planes) = problem.contact {
         let end = Change { position: change, velocity: Vector6::zeros() };
-        let (again, other) = balance(problem, &resting, &motion, Some(&end))?;
-        if other != signature {
-            change = again;
+        if signature_at_end(planes, &resting, &motion, &end) != signature {
+            (change, _) = balance(problem, &resting, &motion, Some(&end))?;
         }
     }
     resting.position += change.fixed_rows::<3>(0);
