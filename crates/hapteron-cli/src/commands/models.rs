@@ -3,6 +3,7 @@
 use crate::arguments::Models;
 use anyhow::{Context, Result};
 use hapteron::{assets, scenes};
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Runs the command.
@@ -10,6 +11,7 @@ pub fn models(arguments: &Models) -> Result<ExitCode> {
     let folder = &arguments.folder;
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let mut out = std::io::stdout().lock();
     for name in assets::BUILTIN_NAMES {
         let mesh = assets::builtin(name)?;
         let path = folder.join(format!("{name}.obj"));
@@ -17,14 +19,14 @@ pub fn models(arguments: &Models) -> Result<ExitCode> {
             assets::write_obj(&mesh, name, std::io::BufWriter::new(std::fs::File::create(&path)?))
         };
         write().with_context(|| format!("cannot write {}", path.display()))?;
-        println!("{}  {} triangles", path.display(), mesh.triangles().len());
+        writeln!(out, "{}  {} triangles", path.display(), mesh.triangles().len())?;
     }
     for name in scenes::NAMES {
         let Some(scene) = scenes::builtin(name) else { continue };
         let path = folder.join(format!("{name}.toml"));
         let text = format!("# hapteron run {} --virtual-time\n{}", path.display(), scene.to_toml()?);
         std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
-        println!("{}", path.display());
+        writeln!(out, "{}", path.display())?;
     }
     Ok(ExitCode::SUCCESS)
 }

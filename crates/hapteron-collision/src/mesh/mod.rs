@@ -105,14 +105,29 @@ impl TriMesh {
         [low, high]
     }
 
-    /// Centre of the bounding box, and greatest distance of a used vertex from it.
+    /// Centre and radius of an enclosing sphere at most 1 % larger than the smallest.
+    ///
+    /// From the middle of the box the centre steps ever less towards the farthest vertex (Badoiu and Clarkson, "Smaller core-sets for
+    /// balls", 2003).
     #[must_use]
     pub fn bounding_sphere(&self) -> ([f64; 3], f64) {
+        use crate::vector::{add, norm, scale, sub};
+        const STEPS: u32 = 100;
+        let used = || self.triangles.iter().flatten().map(|&v| self.vertices[v as usize]);
         let [low, high] = self.bounds();
-        let center = crate::vector::scale(crate::vector::add(low, high), 0.5);
-        let used = self.triangles.iter().flatten().map(|&v| self.vertices[v as usize]);
-        let radius = used.map(|v| crate::vector::norm(crate::vector::sub(v, center))).fold(0.0, f64::max);
-        (center, radius)
+        let mut center = scale(add(low, high), 0.5);
+        let mut best = (center, f64::INFINITY);
+        for step in 1..=STEPS {
+            let farthest = used().fold((center, 0.0), |best, v| {
+                let distance = norm(sub(v, center));
+                if distance > best.1 { (v, distance) } else { best }
+            });
+            if farthest.1 < best.1 {
+                best = (center, farthest.1);
+            }
+            center = add(center, scale(sub(farthest.0, center), 1.0 / (f64::from(step) + 1.0)));
+        }
+        best
     }
 }
 

@@ -75,7 +75,7 @@ impl Element {
 }
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
-    let (encoding, elements, lines, body) = header(bytes)?;
+    let Header { encoding, elements, lines, body } = header(bytes)?;
     let mut source = match encoding {
         Encoding::Text => Source::Text(Words::new(body, lines)),
         _ => Source::Binary { rest: body, little: encoding == Encoding::Little },
@@ -109,8 +109,17 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
     Ok((vertices, triangles))
 }
 
-/// Encoding, elements, number of lines, and what follows.
-fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, usize, &[u8]), MeshError> {
+/// What stands before the numbers.
+struct Header<'a> {
+    encoding: Encoding,
+    elements: Vec<Element>,
+    /// Number of the first line after the header.
+    lines: usize,
+    /// What follows.
+    body: &'a [u8],
+}
+
+fn header(bytes: &[u8]) -> Result<Header<'_>, MeshError> {
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     let mut offset = 0;
@@ -141,7 +150,9 @@ fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, usize, &[u8]), MeshEr
             }
             ["end_header"] => {
                 return match encoding {
-                    Some(encoding) => Ok((encoding, elements, number + 1, &bytes[offset..])),
+                    Some(encoding) => {
+                        Ok(Header { encoding, elements, lines: number + 1, body: &bytes[offset..] })
+                    }
                     None => fail("the header has no 'format' line".into()),
                 };
             }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use hapteron_collision::mesh::TriMesh;
 
-use crate::assets::shape::{Point, cross, dot, subtract};
+use crate::assets::shape::{Point, cross, dot, length, subtract};
 
 /// Pairs of triangles without a common vertex of which an edge of one passes through the other.
 ///
@@ -70,7 +70,8 @@ fn crosses(edges: &[Point; 3], triangle: &[Point; 3]) -> bool {
     (0..3).any(|k| {
         let (from, to) = (edges[k], edges[(k + 1) % 3]);
         let (before, after) = (dot(subtract(from, a), normal), dot(subtract(to, a), normal));
-        if before * after > 0.0 || before == after {
+        // An edge in the triangle's plane, up to rounding, is a neighbour's in a flat part: it decides nothing.
+        if before * after > 0.0 || before.abs().max(after.abs()) < 1e-12 * length(normal) {
             return false;
         }
         // Signs of the volumes that the edge spans with the triangle's sides.

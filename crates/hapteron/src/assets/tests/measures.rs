@@ -16,7 +16,7 @@ pub struct Measures {
     pub euler_characteristic: i64,
     /// Enclosed volume, cubic metres.
     pub volume: f64,
-    /// Radius of the sphere about the middle of the bounding box, metres.
+    /// Radius of the smallest enclosing sphere, metres.
     pub radius: f64,
     /// Smallest angle of each triangle in degrees, ascending.
     pub smallest_angles: Vec<f64>,
@@ -90,17 +90,17 @@ fn smallest_angle(corners: [Point; 3]) -> f64 {
         .fold(180.0, f64::min)
 }
 
+/// Radius of the smallest enclosing sphere, to a thousandth: the centre steps ever less towards the farthest vertex (Badoiu and Clarkson 2003).
 fn radius(vertices: &[Point]) -> f64 {
-    let mut low = [f64::INFINITY; 3];
-    let mut high = [f64::NEG_INFINITY; 3];
-    for vertex in vertices {
-        for axis in 0..3 {
-            low[axis] = low[axis].min(vertex[axis]);
-            high[axis] = high[axis].max(vertex[axis]);
-        }
+    let mut centre = vertices[0];
+    let mut radius = f64::INFINITY;
+    for step in 1..1000 {
+        let distance = |v: &Point| length(subtract(*v, centre));
+        let farthest = vertices.iter().copied().max_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+        radius = radius.min(distance(&farthest));
+        centre = [0, 1, 2].map(|axis| centre[axis] + (farthest[axis] - centre[axis]) / (step as f64 + 1.0));
     }
-    let middle = [0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis]));
-    vertices.iter().map(|&v| length(subtract(v, middle))).fold(0.0, f64::max)
+    radius
 }
 
 /// FNV-1a over the bits of all coordinates and indices: equal only for the same mesh to the last bit.
