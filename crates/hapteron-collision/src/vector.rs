@@ -40,6 +40,19 @@ pub(crate) fn unit_or_zero(a: Vec3) -> Vec3 {
     if length > 0.0 && length.is_finite() { scale(a, 1.0 / length) } else { [0.0; 3] }
 }
 
+/// The unit vector along the first of the two that has a direction, else the z axis.
+#[inline(always)]
+pub(crate) fn unit_or(a: Vec3, other: Vec3) -> Vec3 {
+    let (first, second) = (unit_or_zero(a), unit_or_zero(other));
+    if first != [0.0; 3] {
+        first
+    } else if second != [0.0; 3] {
+        second
+    } else {
+        [0.0, 0.0, 1.0]
+    }
+}
+
 /// A rigid motion as rows of numbers: `rotation * v + translation`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rigid {

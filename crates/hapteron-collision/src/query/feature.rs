@@ -1,7 +1,7 @@
 //! The closest feature of a triangle to a point, and on which side of the surface the point lies.
 
 use crate::surface::{EdgeKind, Surface, VertexNormal};
-use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or_zero};
+use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or};
 
 /// Distances below this (metres) have no direction of their own: the feature's normal is taken.
 const TOUCHING: f64 = 1e-12;
@@ -88,8 +88,9 @@ pub(super) fn foot(p: Vec3, triangle: u32, surface: &Surface) -> Foot {
     let (point, feature) = closest_on_triangle(p, corners, triangle, surface);
     let from = sub(p, point);
     let distance = norm(from);
+    let face = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
     let (outward, sided) = match feature {
-        Feature::Face(_) => (cross(sub(corners[1], corners[0]), sub(corners[2], corners[0])), true),
+        Feature::Face(_) => (face, true),
         Feature::Edge(e) => {
             let edge = &surface.edges[e as usize];
             (edge.normal.map(f64::from), matches!(edge.kind, EdgeKind::Convex | EdgeKind::Hollow))
@@ -100,7 +101,7 @@ pub(super) fn foot(p: Vec3, triangle: u32, surface: &Surface) -> Foot {
         }
     };
     if distance < TOUCHING {
-        return Foot { point, feature, signed_distance: 0.0, normal: unit_or_zero(outward) };
+        return Foot { point, feature, signed_distance: 0.0, normal: unit_or(outward, face) };
     }
     let inside = sided && dot(from, outward) < 0.0;
     let sign = if inside { -1.0 } else { 1.0 };

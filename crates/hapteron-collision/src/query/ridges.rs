@@ -8,7 +8,7 @@ use super::side::Side;
 use super::vertices::Scratch;
 use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{Edge, EdgeKind, LANES, Surface};
-use crate::vector::{Rigid, Vec3, add, cross, dot, norm, scale, sub, unit_or_zero};
+use crate::vector::{Rigid, Vec3, add, cross, dot, norm, scale, sub, unit_or};
 
 /// Slack of the test whether a direction lies in an edge's normal cone (its cosine; the cones are in single precision).
 const CONE_SLACK: f64 = 1e-4;
@@ -197,7 +197,7 @@ fn judge(pair: Pair<'_>, ridge: &Ridge, other: u32, start: Vec3, along: Vec3) ->
     let distance = norm(between);
     let features = [Feature::Edge(ridge.index), Feature::Edge(other)];
     if distance < TOUCHING {
-        let normal = unit_or_zero(sub(ridge.outward, their_outward));
+        let normal = unit_or(sub(ridge.outward, their_outward), cross(d, e));
         return Some(Found {
             point_body: p,
             point_obstacle: q,
