@@ -15,7 +15,7 @@ pub struct Arguments {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Show it working: a built-in scene with a simulated hand, and a report
+    /// Show it working: the upper jaw in a simulated hand chews on the lower one, and a report
     #[command(after_help = "Example:\n  hapteron demo --out my-demo\n")]
     Demo(Demo),
     /// Run a scene and write run.csv, scene.toml and report.html
@@ -28,10 +28,11 @@ pub enum Command {
     #[command(after_help = QUERY_EXAMPLES)]
     Query(Query),
     /// Check and describe a mesh
-    #[command(
-        after_help = "Examples:\n  hapteron mesh part.stl\n  hapteron mesh part.stl --scale 0.001 --picture part.png\n"
-    )]
+    #[command(after_help = "Examples:\n  hapteron mesh part.stl\n  hapteron mesh part.stl --scale 0.001\n")]
     Mesh(Mesh),
+    /// Two runs side by side: a table and a report
+    #[command(after_help = "Example:\n  hapteron compare runs/a runs/b\n")]
+    Compare(Compare),
     /// Write the built-in meshes and scenes into a folder, to start one's own from
     #[command(
         after_help = "Example:\n  hapteron models my-models\n  hapteron run my-models/spoon_in_cup.toml --virtual-time\n"
@@ -113,6 +114,20 @@ pub struct Mesh {
     /// Metres per unit of the mesh
     #[arg(long, default_value_t = 1.0, value_name = "S")]
     pub scale: f64,
+}
+
+/// `hapteron compare`
+#[derive(Args, Debug)]
+pub struct Compare {
+    /// A run.csv, or the folder with it
+    #[arg(value_name = "A")]
+    pub first: PathBuf,
+    /// The run to be compared with the first
+    #[arg(value_name = "B")]
+    pub second: PathBuf,
+    /// Folder for the report [default: runs/compare, numbered when it exists]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// `hapteron models`

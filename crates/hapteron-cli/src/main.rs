@@ -6,6 +6,8 @@
 mod arguments;
 mod commands;
 mod progress;
+mod render;
+mod report;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -19,6 +21,7 @@ fn main() -> ExitCode {
         Command::Reproduce(a) => commands::reproduce::reproduce(&a),
         Command::Query(a) => commands::query::query(&a),
         Command::Mesh(a) => commands::mesh::mesh(&a),
+        Command::Compare(a) => commands::compare::compare(&a),
         Command::Models(a) => commands::models::models(&a),
     };
     match outcome {

@@ -1,7 +1,7 @@
 //! Motions of the hand given by formulas: the sums of sines of the paper's free-space experiment, and way points.
 
 use crate::trajectory::{PoseRow, Trajectory, TrajectoryError};
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 /// A sum of sines under a window, with its derivative.
 #[derive(Clone, Copy, Debug)]
@@ -138,7 +138,7 @@ impl WayPoints {
 }
 
 /// Motions that [`builtin`] knows.
-pub const BUILTIN_NAMES: [&str; 2] = ["free-space", "spoon-in-cup"];
+pub const BUILTIN_NAMES: [&str; 3] = ["free-space", "spoon-in-cup", "chewing"];
 
 /// A built-in motion by its name, at every `dt`, in the world of the built-in scene that uses it.
 ///
@@ -150,6 +150,10 @@ pub fn builtin(name: &str, dt: f64) -> Result<Trajectory, TrajectoryError> {
         "spoon-in-cup" => {
             let (motion, world_from_motion) = spoon_in_cup();
             motion.trajectory(dt, &world_from_motion)
+        }
+        "chewing" => {
+            let world_from_motion = Isometry3::from(Translation3::from(crate::scenes::JAW_GRIP));
+            chewing().trajectory(dt, &world_from_motion)
         }
         _ => Err(TrajectoryError {
             file: format!("builtin:{name}"),
@@ -180,6 +184,25 @@ fn spoon_in_cup() -> (WayPoints, Isometry3<f64>) {
     let grip = Vector3::from(crate::scenes::SPOON_GRIP);
     let origin = centre + rotation * (grip - in_opening);
     (WayPoints { channels, duration: 0.65 }, Isometry3::from_parts(origin.into(), rotation))
+}
+
+/// The hand of Fig. 6: 900 ms. It closes the jaws, grinds to the right and to the left while it presses, and opens them. The
+/// goal of the way points lies below the lower jaw's teeth: the coupling turns that into a push.
+fn chewing() -> WayPoints {
+    let mut channels: [Vec<(f64, f64)>; 6] = Default::default();
+    channels[0] = vec![(0.24, 0.0), (0.38, 0.0030), (0.56, -0.0030), (0.72, 0.0)];
+    channels[1] = vec![(0.28, 0.0), (0.46, 0.0012), (0.64, -0.0012), (0.78, 0.0)];
+    channels[2] = vec![
+        (0.0, crate::scenes::JAW_OPENING),
+        (0.22, -0.0025),
+        (0.40, -0.0040),
+        (0.52, -0.0025),
+        (0.66, -0.0040),
+        (0.88, crate::scenes::JAW_OPENING),
+    ];
+    channels[3] = vec![(0.26, 0.0), (0.42, 0.02), (0.60, -0.02), (0.76, 0.0)];
+    channels[5] = vec![(0.24, 0.0), (0.40, 0.03), (0.58, -0.03), (0.76, 0.0)];
+    WayPoints { channels, duration: 0.9 }
 }
 
 fn between(points: &[(f64, f64)], t: f64) -> f64 {

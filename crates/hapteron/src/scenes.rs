@@ -1,7 +1,7 @@
 //! The scenes that come with the library: those of the paper's section 7.
 
 use crate::scene::file::{
-    Body, Contact, ContactThread, Coupling, General, Hand, Integrator, Method, Obstacle, SceneFile,
+    Body, Contact, ContactThread, Coupling, Device, General, Hand, Integrator, Method, Obstacle, SceneFile,
 };
 
 /// Inertia of the paper's spoon for one kilogram, about its centre of mass, m^2 (x along it, z up).
@@ -11,8 +11,14 @@ pub const SPOON_INERTIA_PER_MASS: [[f64; 3]; 3] =
 /// Where the spoon is held, from its centre of mass, metres.
 pub const SPOON_GRIP: [f64; 3] = [0.052258, 0.0, 0.011393];
 
+/// Where the upper jaw is held, mesh frame, metres: over the middle of its arch.
+pub const JAW_GRIP: [f64; 3] = [0.0, 0.03, 0.03];
+
+/// How far the jaws are open at the start and the end, metres.
+pub const JAW_OPENING: f64 = 0.006;
+
 /// Names of the scenes, as [`builtin`] knows them.
-pub const NAMES: [&str; 2] = ["spoon_in_free_space", "spoon_in_cup"];
+pub const NAMES: [&str; 3] = ["spoon_in_free_space", "spoon_in_cup", "jaws"];
 
 /// A scene by its name.
 #[must_use]
@@ -20,6 +26,7 @@ pub fn builtin(name: &str) -> Option<SceneFile> {
     match name {
         "spoon_in_free_space" => Some(spoon_in_free_space(0.01, Method::BackwardEuler)),
         "spoon_in_cup" => Some(spoon_in_cup(0.01, 2e3, Method::BackwardEuler)),
+        "jaws" => Some(jaws()),
         _ => None,
     }
 }
@@ -68,6 +75,36 @@ pub fn spoon_in_cup(mass: f64, stiffness: f64, method: Method) -> SceneFile {
         contact_thread: ContactThread { period: Some(1e-3), latency: Some(0.0) },
         hand: Hand { trajectory: Some("builtin:spoon-in-cup".to_owned()), ..Hand::default() },
         ..spoon_in_free_space(mass, method)
+    }
+}
+
+/// Fig. 6: the upper jaw chews on the lower one for 0.9 s.
+///
+/// Mass, stiffnesses and the scale of the device are the paper's; tolerance, damping and angular coupling are not in it. The contact model and
+/// the contact thread are the library's defaults.
+#[must_use]
+pub fn jaws() -> SceneFile {
+    SceneFile {
+        scene: named("jaws"),
+        body: Body {
+            mesh: "builtin:upper_jaw".to_owned(),
+            mass: Some(0.01),
+            position: Some([0.0, 0.0, JAW_OPENING]),
+            ..Body::default()
+        },
+        obstacle: vec![Obstacle { mesh: "builtin:lower_jaw".to_owned(), ..Obstacle::default() }],
+        coupling: Coupling {
+            linear_stiffness: Some(500.0),
+            linear_damping: Some(3.0),
+            angular_stiffness: Some(1.5),
+            angular_damping: Some(0.006),
+            grasp_position: Some(JAW_GRIP),
+            ..Coupling::default()
+        },
+        contact: Contact { stiffness: Some(5e3), tolerance: Some(5e-4), ..Contact::default() },
+        device: Device { position_scale: Some(0.4) },
+        hand: Hand { trajectory: Some("builtin:chewing".to_owned()), ..Hand::default() },
+        ..SceneFile::default()
     }
 }
 

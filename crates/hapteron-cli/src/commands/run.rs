@@ -2,10 +2,12 @@
 
 use crate::arguments::Run;
 use crate::progress;
+use crate::report;
 use anyhow::{Context, Result, bail};
 use hapteron::recording::{Recording, Summary};
 use hapteron::scene::{Changes, Scene};
-use hapteron::session::run_virtual;
+use hapteron::session::{ContactPass, run_virtual};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -38,17 +40,36 @@ pub fn run_into(scene: &Scene, folder: &Path) -> Result<ExitCode> {
     // Before the run, so that a folder that cannot be written is known at once.
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let notes = notes(scene);
+    for note in &notes {
+        eprintln!("warning: {note}");
+    }
     let started = Instant::now();
     let recording = record(scene, scene.name())?;
     let wall = started.elapsed().as_secs_f64();
-    write_folder(scene, &recording, folder)?;
+    write_folder(scene, &recording, wall, &notes, folder)?;
     let summary = recording.summary();
-    print_summary(scene, &recording, &summary, wall);
-    println!("  {}", folder.join("report.html").display());
+    let mut out = std::io::stdout().lock();
+    print_summary(&mut out, scene, &recording, &summary, wall)?;
+    writeln!(out, "  {}", folder.join("report.html").display())?;
     if recording.cancelled {
         eprintln!("stopped by Ctrl-C after {:.3} s of {:.3} s", summary.duration, scene.duration());
     }
     Ok(if summary.stable && !recording.cancelled { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// What a user should know of a scene before it runs.
+fn notes(scene: &Scene) -> Vec<String> {
+    let depth = -ContactPass::new(scene).measure(scene, &scene.start);
+    let mut notes = Vec::new();
+    if depth > scene.contact.tolerance.min(1e-4) {
+        notes.push(format!(
+            "at the start the surfaces already cross, by {:.3} mm: the body will be pushed out, or stay wedged. Cure: another body.position or \
+             body.orientation, or a motion that starts apart",
+            depth * 1e3
+        ));
+    }
+    notes
 }
 
 /// Runs a scene with a progress bar, ended by Ctrl-C.
@@ -67,38 +88,55 @@ pub fn record(scene: &Scene, title: &str) -> Result<Recording> {
 }
 
 /// Writes `run.csv`, `scene.toml` and `report.html`.
-fn write_folder(scene: &Scene, recording: &Recording, folder: &Path) -> Result<()> {
+fn write_folder(
+    scene: &Scene,
+    recording: &Recording,
+    wall: f64,
+    notes: &[String],
+    folder: &Path,
+) -> Result<()> {
     let path = folder.join("run.csv");
     let file = std::fs::File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
     recording.write_csv(file).with_context(|| format!("cannot write {}", path.display()))?;
     let path = folder.join("scene.toml");
     std::fs::write(&path, scene.to_toml()?).with_context(|| format!("cannot write {}", path.display()))?;
+    let path = folder.join("report.html");
+    let html = report::run(scene, recording, wall, notes)?;
+    std::fs::write(&path, html).with_context(|| format!("cannot write {}", path.display()))?;
     Ok(())
 }
 
-fn print_summary(scene: &Scene, recording: &Recording, summary: &Summary, wall: f64) {
+fn print_summary(
+    out: &mut impl Write,
+    scene: &Scene,
+    recording: &Recording,
+    summary: &Summary,
+    wall: f64,
+) -> std::io::Result<()> {
     let state = if summary.stable { "stable" } else { "NOT STABLE" };
-    println!("{}: {:.3} s in virtual time, {state}", scene.name(), summary.duration);
+    writeln!(out, "{}: {:.3} s in virtual time, {state}", scene.name(), summary.duration)?;
     if let Some(time) = recording.fault_time {
-        println!("  a fault stopped the force at {time:.3} s");
+        writeln!(out, "  a fault stopped the force at {time:.3} s")?;
     }
-    println!(
+    writeln!(
+        out,
         "  feedback up to {:.3} N, {:.1} mN m; coupling deviation up to {:.3} mm",
         summary.greatest_force,
         summary.greatest_torque * 1e3,
         summary.greatest_deviation * 1e3
-    );
+    )?;
     let depth = summary.greatest_penetration * 1e3;
     let penetration = if depth > 0.0 {
         format!("surfaces crossed by up to {depth:.4} mm")
     } else {
         "the surfaces never crossed".to_owned()
     };
-    println!(
+    writeln!(
+        out,
         "  in contact {:.0} % of the time, up to {} contacts on {} planes; {penetration}",
         summary.in_contact * 100.0,
         summary.most_contacts,
         summary.most_planes
-    );
-    println!("  computed in {wall:.2} s ({:.2} times real time)", summary.duration / wall);
+    )?;
+    writeln!(out, "  computed in {wall:.2} s ({:.2} times real time)", summary.duration / wall)
 }

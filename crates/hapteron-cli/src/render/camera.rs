@@ -2,15 +2,6 @@
 
 use nalgebra::{Point3, Vector3};
 
-/// How depth is mapped to the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Projection {
-    /// Parallel rays: lengths can be compared.
-    Orthographic,
-    /// Rays through the eye; the angle is the full vertical field of view, radians.
-    Perspective(f64),
-}
-
 /// A point of view: maps world positions (metres) to the picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
@@ -18,40 +9,33 @@ pub struct Camera {
     right: Vector3<f64>,
     up: Vector3<f64>,
     back: Vector3<f64>,
-    projection: Projection,
-    /// Half the picture's height: metres for parallel rays, tangent of half the field of view otherwise.
+    /// Tangent of half the vertical field of view.
     half_height: f64,
 }
 
 impl Camera {
     /// A camera that looks along `direction` and shows a whole sphere, with a margin of 4 %.
     ///
-    /// `up` may be any vector that is not parallel to `direction`; `aspect` is width over height.
+    /// `up` may be any vector that is not parallel to `direction`; `angle` is the vertical field of view in radians, `aspect` width over height.
     pub fn framing(
         centre: Point3<f64>,
         radius: f64,
         direction: Vector3<f64>,
         up: Vector3<f64>,
-        projection: Projection,
+        angle: f64,
         aspect: f64,
     ) -> Self {
         let back = -unit_or(direction, -Vector3::y());
         let right = unit_or(up.cross(&back), Vector3::x());
         let up = back.cross(&right);
         let radius = 1.04 * radius.max(1e-9) / aspect.min(1.0);
-        let (distance, half_height) = match projection {
-            Projection::Orthographic => (4.0 * radius, radius),
-            Projection::Perspective(angle) => (radius / (0.5 * angle).sin(), (0.5 * angle).tan()),
-        };
-        Self { eye: centre + back * distance, right, up, back, projection, half_height }
+        let (distance, half_height) = (radius / (0.5 * angle).sin(), (0.5 * angle).tan());
+        Self { eye: centre + back * distance, right, up, back, half_height }
     }
 
     /// Direction from the scene towards the eye at a world position; unit length.
     pub fn towards_eye(&self, position: &Point3<f64>) -> Vector3<f64> {
-        match self.projection {
-            Projection::Orthographic => self.back,
-            Projection::Perspective(_) => unit_or(self.eye - position, self.back),
-        }
+        unit_or(self.eye - position, self.back)
     }
 
     /// The camera's axes in the world: right, up, backwards.
@@ -69,14 +53,10 @@ impl Camera {
         if depth <= 1e-9 {
             return None;
         }
-        let (divisor, nearness) = match self.projection {
-            Projection::Orthographic => (1.0, -depth),
-            Projection::Perspective(_) => (depth, 1.0 / depth),
-        };
-        let scale = 0.5 * height / (self.half_height * divisor);
+        let scale = 0.5 * height / (self.half_height * depth);
         let x = 0.5 * width + offset.dot(&self.right) * scale;
         let y = 0.5 * height - offset.dot(&self.up) * scale;
-        Some([x, y, nearness])
+        Some([x, y, 1.0 / depth])
     }
 }
 

@@ -4,46 +4,24 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::{Camera, Colour, Picture};
 
-/// How a surface takes the light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shading {
-    /// Every triangle with its own normal: shows the triangles.
-    Flat,
-    /// Normals averaged at vertices, except over edges sharper than this angle, radians: shows the shape.
-    Smooth(f64),
-}
+/// Normals are averaged at vertices, except over edges sharper than this angle, radians.
+const CREASE: f64 = 0.7;
 
 /// Looks of a mesh.
 #[derive(Clone, Copy, Debug)]
-pub struct Style<'a> {
+pub struct Style {
     /// Colour of the outside.
     pub colour: Colour,
-    /// Colour of each triangle, in their order; overrides `colour`. Missing ones fall back to it.
-    pub triangle_colours: &'a [Colour],
-    /// Flat or smooth shading.
-    pub shading: Shading,
-    /// Draws the triangles' edges in this colour as well.
-    pub wireframe: Option<Colour>,
-    /// Leaves the surface out and only draws what else is asked for (its edges).
-    pub hide_surface: bool,
     /// Cuts away what lies on the side of the normal: a point of the plane and the normal, world frame.
     pub cut: Option<(Point3<f64>, Vector3<f64>)>,
     /// Colour of the inside where a cut or a hole shows it; unshaded, so that it looks like the cut face.
     pub inside: Colour,
 }
 
-impl Style<'_> {
+impl Style {
     /// A smooth surface of one colour.
     pub fn coloured(colour: Colour) -> Self {
-        Self {
-            colour,
-            triangle_colours: &[],
-            shading: Shading::Smooth(0.7),
-            wireframe: None,
-            hide_surface: false,
-            cut: None,
-            inside: [196, 92, 84],
-        }
+        Self { colour, cut: None, inside: [196, 92, 84] }
     }
 }
 
@@ -57,25 +35,14 @@ impl Picture {
         vertices: &[[f64; 3]],
         triangles: &[[u32; 3]],
         world_from_mesh: &Isometry3<f64>,
-        style: &Style<'_>,
+        style: &Style,
     ) {
         let world: Vec<Point3<f64>> = vertices.iter().map(|&v| world_from_mesh * Point3::from(v)).collect();
         let valid = |t: &[u32; 3]| t.iter().all(|&i| (i as usize) < world.len());
-        let normals = corner_normals(&world, triangles, style.shading);
+        let normals = corner_normals(&world, triangles);
         for (index, triangle) in triangles.iter().enumerate().filter(|(_, t)| valid(t)) {
             let corners = triangle.map(|i| world[i as usize]);
-            let colour = style.triangle_colours.get(index).copied().unwrap_or(style.colour);
-            if !style.hide_surface {
-                self.fill(camera, &corners, &normals[index], colour, style);
-            }
-            if let Some(edge_colour) = style.wireframe {
-                for k in 0..3 {
-                    let (from, to) = (corners[k], corners[(k + 1) % 3]);
-                    if style.cut.is_none_or(|(p, n)| (from - p).dot(&n) <= 0.0 && (to - p).dot(&n) <= 0.0) {
-                        self.draw_segment(camera, &from, &to, 0.5, edge_colour);
-                    }
-                }
-            }
+            self.fill(camera, &corners, &normals[index], style);
         }
     }
 
@@ -84,8 +51,7 @@ impl Picture {
         camera: &Camera,
         corners: &[Point3<f64>; 3],
         normals: &[Vector3<f64>; 3],
-        colour: Colour,
-        style: &Style<'_>,
+        style: &Style,
     ) {
         let (width, height) = self.samples();
         let mut on_screen = [[0.0; 3]; 3];
@@ -127,7 +93,7 @@ impl Picture {
                 }
                 let shown = if outside {
                     let normal = normals[0] * wa + normals[1] * wb + normals[2] * wc;
-                    lit(colour, &normal, &camera.towards_eye(&position), camera)
+                    lit(style.colour, &normal, &camera.towards_eye(&position), camera)
                 } else {
                     style.inside
                 };
@@ -138,15 +104,10 @@ impl Picture {
 }
 
 /// A normal for each corner of each triangle.
-fn corner_normals(world: &[Point3<f64>], triangles: &[[u32; 3]], shading: Shading) -> Vec<[Vector3<f64>; 3]> {
+fn corner_normals(world: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<[Vector3<f64>; 3]> {
     let get = |i: u32| world.get(i as usize).copied().unwrap_or_else(Point3::origin);
-    let faces: Vec<Vector3<f64>> = triangles
-        .iter()
-        .map(|t| (get(t[1]) - get(t[0])).cross(&(get(t[2]) - get(t[0]))))
-        .collect();
-    let Shading::Smooth(crease) = shading else {
-        return faces.iter().map(|&normal| [normal; 3]).collect();
-    };
+    let faces: Vec<Vector3<f64>> =
+        triangles.iter().map(|t| (get(t[1]) - get(t[0])).cross(&(get(t[2]) - get(t[0])))).collect();
     let mut around: Vec<Vec<u32>> = vec![Vec::new(); world.len()];
     for (index, triangle) in triangles.iter().enumerate() {
         for &i in triangle {
@@ -155,7 +116,7 @@ fn corner_normals(world: &[Point3<f64>], triangles: &[[u32; 3]], shading: Shadin
             }
         }
     }
-    let limit = crease.cos();
+    let limit = CREASE.cos();
     let mut normals = Vec::with_capacity(triangles.len());
     for (index, triangle) in triangles.iter().enumerate() {
         let own = faces[index];

@@ -21,12 +21,7 @@ impl Picture {
     /// An empty picture of a size in pixels.
     pub fn new(width: usize, height: usize, background: Colour) -> Self {
         let samples = width * height * OVERSAMPLING * OVERSAMPLING;
-        Self {
-            width,
-            height,
-            colours: vec![background; samples],
-            nearness: vec![f64::NEG_INFINITY; samples],
-        }
+        Self { width, height, colours: vec![background; samples], nearness: vec![f64::NEG_INFINITY; samples] }
     }
 
     /// Width and height in samples.
@@ -76,7 +71,8 @@ impl Picture {
     /// When the picture is too large or empty for the format.
     pub fn to_png(&self) -> io::Result<Vec<u8>> {
         let invalid = |error: png::EncodingError| io::Error::new(io::ErrorKind::InvalidData, error);
-        let size = |n: usize| u32::try_from(n).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error));
+        let size =
+            |n: usize| u32::try_from(n).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error));
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, size(self.width)?, size(self.height)?);
         encoder.set_color(png::ColorType::Rgb);

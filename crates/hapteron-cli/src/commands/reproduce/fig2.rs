@@ -1,6 +1,6 @@
 //! Fig. 2, section 7.2: the spoon in free space with three integrators.
 
-use super::figure::{Curve, Figure, Row, curve, greatest, is_stable, record};
+use super::figure::{Curve, Figure, Quantity, Row, curve, greatest, is_stable, record};
 use crate::progress;
 use anyhow::Result;
 use hapteron::recording::Recording;
@@ -11,6 +11,23 @@ const SETTING: &str = "A spoon of 20 cm follows a hand that moves up to 1.4 m/s 
 k_c = 200 N/m and k_theta = 0.6 N m/rad are the paper's; b_c = 2 N s/m, b_theta = 0.0166 N m s/rad, the spoon's inertia and the motion \
 are not in the paper and are one choice that agrees with its figures. Stable means: no fault, coupling deviation below 10 cm \
 and coupling angle below 1.5 rad to the end.";
+
+const SHOWN: [Quantity; 2] = [
+    Quantity {
+        title: "Coupling deviation",
+        unit: "mm",
+        clip: 40.0,
+        mark: None,
+        value: |r| r.deviation * 1e3,
+    },
+    Quantity {
+        title: "Coupling force (feedback to the hand)",
+        unit: "N",
+        clip: 10.0,
+        mark: None,
+        value: |r| r.feedback[0].norm(),
+    },
+];
 
 /// The masses of the sweep with Backward Euler, grams.
 const SWEEP: [f64; 12] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 70.0, 100.0, 200.0, 300.0];
@@ -35,7 +52,8 @@ pub fn run() -> Result<Figure> {
     let curves = curves()?;
     bar.finish_and_clear();
     let title = "Fig. 2  free-space motion (section 7.2)";
-    Ok(Figure { name: "fig2", title, setting: SETTING, rows, curves })
+    let panels = vec![(String::new(), curves.iter().map(|c| c.label.clone()).collect())];
+    Ok(Figure { name: "fig2", title, setting: SETTING, rows, curves, shown: &SHOWN, panels })
 }
 
 /// Smallest stable mass in kg by bisection to one part in a thousand, between a mass that is not stable and one that is.

@@ -1,6 +1,6 @@
 //! Fig. 4, section 7.3: the spoon held inside the handle of the cup.
 
-use super::figure::{Curve, Figure, Row, curve, greatest};
+use super::figure::{Curve, Figure, Quantity, Row, curve, greatest};
 use crate::progress;
 use anyhow::Result;
 use hapteron::recording::Recording;
@@ -11,6 +11,24 @@ const SETTING: &str = "The spoon's handle is put through the handle of the cup; 
 cup with about 2 N. k_c = 200 N/m and the three settings are the paper's. Not in the paper, and chosen here: tolerance d = 1 mm (one contact under a push f \
 sinks by f/k - d), contact damping half of critical, at most 8 clusters, the linearized contact model with a contact thread as fast as the haptic one, \
 the coupling's damping and the spoon's inertia as in Fig. 2. Roughness is the root mean square of the step of the contact force's magnitude from tick to tick.";
+
+const SHOWN: [Quantity; 3] = [
+    Quantity {
+        title: "Penetration (negative: distance, as far as d)",
+        unit: "mm",
+        clip: 2.0,
+        mark: Some((0.6, "0.6 mm")),
+        value: |r| r.penetration * 1e3,
+    },
+    Quantity {
+        title: "Feedback force to the hand",
+        unit: "N",
+        clip: 10.0,
+        mark: None,
+        value: |r| r.feedback[0].norm(),
+    },
+    Quantity { title: "Contact force", unit: "N", clip: 10.0, mark: None, value: |r| r.contact[0].norm() },
+];
 
 struct Setting {
     label: &'static str,
@@ -80,7 +98,9 @@ pub fn run() -> Result<Figure> {
     bar.finish_and_clear();
     let readings: Vec<Reading> = curves.iter().map(|c| read(&c.recording)).collect();
     let title = "Fig. 4  contact state (section 7.3)";
-    Ok(Figure { name: "fig4", title, setting: SETTING, rows: rows(&curves, &readings), curves })
+    let panels = vec![(String::new(), curves.iter().map(|c| c.label.clone()).collect())];
+    let rows = rows(&curves, &readings);
+    Ok(Figure { name: "fig4", title, setting: SETTING, rows, curves, shown: &SHOWN, panels })
 }
 
 fn rows(curves: &[Curve], readings: &[Reading]) -> Vec<Row> {

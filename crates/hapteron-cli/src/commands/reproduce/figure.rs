@@ -17,20 +17,12 @@ pub struct Row {
     pub measured: String,
     /// Whether they agree.
     pub holds: bool,
-    /// Why not, or what the comparison rests on.
-    pub why: Option<String>,
 }
 
 impl Row {
     /// A row.
     pub fn new(what: &str, paper: &str, measured: String, holds: bool) -> Self {
-        Self { what: what.to_owned(), paper: paper.to_owned(), measured, holds, why: None }
-    }
-
-    /// With a reason.
-    pub fn because(mut self, why: &str) -> Self {
-        self.why = Some(why.to_owned());
-        self
+        Self { what: what.to_owned(), paper: paper.to_owned(), measured, holds }
     }
 }
 
@@ -45,8 +37,23 @@ pub struct Curve {
     pub recording: Recording,
 }
 
+/// A quantity that is plotted over time.
+#[derive(Clone, Copy)]
+pub struct Quantity {
+    /// For people.
+    pub title: &'static str,
+    /// After scaling.
+    pub unit: &'static str,
+    /// Not shown beyond this magnitude.
+    pub clip: f64,
+    /// A level with a name.
+    pub mark: Option<(f64, &'static str)>,
+    /// From a tick.
+    pub value: fn(&hapteron::recording::Row) -> f64,
+}
+
 /// An experiment's results.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Figure {
     /// As on the command line.
     pub name: &'static str,
@@ -58,6 +65,10 @@ pub struct Figure {
     pub rows: Vec<Row>,
     /// The runs shown.
     pub curves: Vec<Curve>,
+    /// What is plotted of them.
+    pub shown: &'static [Quantity],
+    /// Groups of plots: a title and the labels of the curves in it.
+    pub panels: Vec<(String, Vec<String>)>,
 }
 
 /// Runs a scene to its end.

@@ -2,20 +2,26 @@
 
 mod fig2;
 mod fig4;
-mod figure;
+mod fig6;
+pub mod figure;
 
 use crate::arguments::{Figure as Name, Reproduce};
 use crate::commands::run::free_folder;
 use crate::progress;
-use anyhow::{Context, Result, bail};
+use crate::report;
+use anyhow::{Context, Result};
 use figure::{Figure, Row};
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
 /// Runs the command.
 pub fn reproduce(arguments: &Reproduce) -> Result<ExitCode> {
-    let names =
-        if arguments.figures.is_empty() { vec![Name::Fig2, Name::Fig4] } else { arguments.figures.clone() };
+    let names = if arguments.figures.is_empty() {
+        vec![Name::Fig2, Name::Fig4, Name::Fig6]
+    } else {
+        arguments.figures.clone()
+    };
     let folder = arguments.out.clone().unwrap_or_else(|| free_folder("reproduce"));
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
@@ -25,37 +31,38 @@ pub fn reproduce(arguments: &Reproduce) -> Result<ExitCode> {
         let figure = match name {
             Name::Fig2 => fig2::run()?,
             Name::Fig4 => fig4::run()?,
-            Name::Fig6 => bail!("later"),
+            Name::Fig6 => fig6::run()?,
         };
-        print_figure(&figure);
+        print_figure(&mut std::io::stdout().lock(), &figure)?;
         write_curves(&figure, &folder)?;
         figures.push(figure);
     }
     let rows: Vec<&Row> = figures.iter().flat_map(|f| &f.rows).collect();
     let holding = rows.iter().filter(|r| r.holds).count();
-    println!("{holding} of {} rows hold", rows.len());
-    println!("{}", folder.join("report.html").display());
+    let path = folder.join("report.html");
+    std::fs::write(&path, report::reproduction(&figures))
+        .with_context(|| format!("cannot write {}", path.display()))?;
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{holding} of {} rows hold", rows.len())?;
+    writeln!(out, "{}", path.display())?;
     Ok(if holding == rows.len() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// The table 'paper / measured / holds'.
-fn print_figure(figure: &Figure) {
+fn print_figure(out: &mut impl Write, figure: &Figure) -> std::io::Result<()> {
     let width = |column: &dyn Fn(&Row) -> &str, title: &str| {
         figure.rows.iter().map(|r| column(r).chars().count()).chain([title.len()]).max().unwrap_or(0)
     };
     let what = width(&|r| &r.what, "what");
     let paper = width(&|r| &r.paper, "paper");
     let measured = width(&|r| &r.measured, "measured");
-    println!("{}", figure.title);
-    println!("  {:what$}  {:paper$}  {:measured$}  holds", "what", "paper", "measured");
+    writeln!(out, "{}", figure.title)?;
+    writeln!(out, "  {:what$}  {:paper$}  {:measured$}  holds", "what", "paper", "measured")?;
     for row in &figure.rows {
         let verdict = if row.holds { "holds" } else { "does not hold" };
-        println!("  {:what$}  {:paper$}  {:measured$}  {verdict}", row.what, row.paper, row.measured);
-        if let Some(why) = row.why.as_ref().filter(|_| !row.holds) {
-            println!("      why: {why}");
-        }
+        writeln!(out, "  {:what$}  {:paper$}  {:measured$}  {verdict}", row.what, row.paper, row.measured)?;
     }
-    println!();
+    writeln!(out)
 }
 
 /// One CSV per curve, in the form of `run.csv`.

@@ -1,0 +1,150 @@
+//! The report of a run.
+
+use super::picture;
+use super::plot::{Plot, Plots};
+use super::{Cell, Page};
+use anyhow::Result;
+use hapteron::recording::{GREATEST_DEVIATION, Recording, Row};
+use hapteron::scene::{ContactModel, Scene};
+use nalgebra::Vector3;
+
+/// Red in the list of colours of the script is the second; the magnitude is drawn dark.
+const DARK: usize = 3;
+
+/// `report.html` of a run. `notes` are said at its top.
+pub fn run(scene: &Scene, recording: &Recording, wall: f64, notes: &[String]) -> Result<String> {
+    let summary = recording.summary();
+    let verdict = if summary.stable { "stable" } else { "not stable" };
+    let mut page = Page::new(scene.name(), Some((verdict, summary.stable)));
+    page.paragraph(&what_was_run(scene, recording), true);
+    for note in notes {
+        page.paragraph(note, false);
+    }
+    let depth = summary.greatest_penetration * 1e3;
+    let penetration = if depth > 0.0 { format!("{depth:.3} mm") } else { "none".to_owned() };
+    page.tiles(&[
+        (format!("{:.2} N", summary.greatest_force), "greatest feedback force"),
+        (format!("{:.1} mN m", summary.greatest_torque * 1e3), "greatest feedback torque"),
+        (penetration, "greatest penetration"),
+        (format!("{:.2} mm", summary.greatest_deviation * 1e3), "greatest coupling deviation"),
+        (format!("{:.0} %", summary.in_contact * 100.0), "of the time in contact"),
+        (format!("{} on {}", summary.most_contacts, summary.most_planes), "most contacts on planes"),
+        (format!("{:.0} mN", summary.force_roughness * 1e3), "rms force step a tick, in contact"),
+        (format!("{:.1} x", summary.duration / wall.max(1e-9)), "real time, computed"),
+    ]);
+    page.pictures(&picture::of_run(scene, recording)?);
+    page.heading("Over time");
+    page.plots(&plots(recording));
+    page.heading("Setting");
+    page.table(&["quantity", "value"], &setting(scene));
+    page.details("scene.toml: every value of this run", &scene.to_toml()?);
+    page.paragraph(
+        "Repeat it bit for bit with: hapteron run scene.toml --virtual-time (in this folder). The numbers behind the plots are in run.csv.",
+        true,
+    );
+    Ok(page.finish())
+}
+
+fn what_was_run(scene: &Scene, recording: &Recording) -> String {
+    let triangles = |mesh: &hapteron::collision::mesh::TriMesh| mesh.triangles().len();
+    let obstacles: usize = scene.obstacles.iter().map(|o| triangles(&o.model.mesh)).sum();
+    let hand =
+        if scene.hand.is_some() { "a simulated hand that feels the force" } else { "a recorded motion" };
+    let mut text = format!(
+        "{:.3} s in virtual time at {:.0} Hz: a body of {:.3} g and {} triangles, held by {hand}, against {obstacles} triangles.",
+        recording.rows.last().map_or(0.0, |r| r.time),
+        1.0 / scene.time_step,
+        scene.body.mass() * 1e3,
+        triangles(&scene.model.mesh),
+    );
+    if let Some(time) = recording.fault_time {
+        text.push_str(&format!(" A fault stopped the force at {time:.3} s."));
+    }
+    if recording.cancelled {
+        text.push_str(" Ended by Ctrl-C.");
+    }
+    text
+}
+
+fn plots(recording: &Recording) -> Plots {
+    let rows = &recording.rows;
+    let mut plots = Plots::new("time [s]");
+    let column = |value: &dyn Fn(&Row) -> f64| rows.iter().map(value).collect::<Vec<f64>>();
+    let times = plots.times(&column(&|r| r.time));
+    let vector = |title: &str, unit: &str, scale: f64, get: &dyn Fn(&Row) -> Vector3<f64>| {
+        let mut plot = Plot::new(title, unit);
+        for (axis, label) in ["x", "y", "z"].into_iter().enumerate() {
+            plot = plot.series(label, times, &column(&|r| get(r)[axis] * scale));
+        }
+        plot.series("magnitude", times, &column(&|r| get(r).norm() * scale)).coloured(DARK)
+    };
+    plots.add(vector("Feedback force to the hand", "N", 1.0, &|r| r.feedback[0]));
+    plots.add(vector("Feedback torque to the hand", "mN m", 1e3, &|r| r.feedback[1]));
+    plots.add(vector("Contact force on the body", "N", 1.0, &|r| r.contact[0]));
+    plots.add(Plot::new("Penetration (negative: distance, as far as d)", "mm").series(
+        "penetration",
+        times,
+        &column(&|r| r.penetration * 1e3),
+    ));
+    plots.add(
+        Plot::new("Coupling deviation", "mm")
+            .series("deviation", times, &column(&|r| r.deviation * 1e3))
+            .clipped(GREATEST_DEVIATION * 1e3),
+    );
+    plots.add(
+        Plot::new("Contacts found and planes used (anticipation included)", "")
+            .series("contacts", times, &column(&|r| f64::from(r.contacts)))
+            .series("planes", times, &column(&|r| f64::from(r.clusters))),
+    );
+    plots.add(Plot::new("Age of the contacts", "ms").series("age", times, &column(&|r| r.contact_age * 1e3)));
+    plots
+}
+
+fn setting(scene: &Scene) -> Vec<Vec<Cell>> {
+    let row = |what: &str, value: String| vec![Cell::Text(what.to_owned()), Cell::Text(value)];
+    let c = &scene.contact;
+    let model = match c.model {
+        ContactModel::Planes => "planes, re-evaluated at every tick, never pulling",
+        ContactModel::Linearized => "linearized at the contacts' state (Eq. 30)",
+        ContactModel::Held => "held between updates",
+    };
+    let clusters = match c.max_clusters {
+        0 => "every contact a plane of its own".to_owned(),
+        n => format!("at most {n} clusters"),
+    };
+    let scale = scene.file.device.position_scale.unwrap_or(1.0);
+    let coupling = &scene.file.coupling;
+    let of = |value: Option<f64>| value.unwrap_or(0.0);
+    vec![
+        row("integrator", format!("{:?}, {} ms", scene.method, scene.time_step * 1e3)),
+        row(
+            "coupling",
+            format!(
+                "{} N/m, {} N s/m; {} N m/rad, {} N m s/rad",
+                of(coupling.linear_stiffness),
+                of(coupling.linear_damping),
+                of(coupling.angular_stiffness),
+                of(coupling.angular_damping)
+            ),
+        ),
+        row(
+            "contact",
+            format!(
+                "{} N/m, {:.3} N s/m, from a distance of d = {} mm",
+                c.stiffness,
+                c.damping,
+                c.tolerance * 1e3
+            ),
+        ),
+        row("contact model", format!("{model}; {clusters}")),
+        row(
+            "device",
+            format!(
+                "its motion counts {scale}; force to the hand times {:.4}, torque times {:.4}",
+                1.0 / scale,
+                1.0 / (scale * scale)
+            ),
+        ),
+        row("contact thread", format!("every {} ms, {} ms late", c.period * 1e3, c.latency * 1e3)),
+    ]
+}

@@ -1,0 +1,105 @@
+//! What the commands write for people to look at.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{Folder, fails, hapteron, stderr, stdout};
+
+/// A report that needs nothing from elsewhere, and whose numbers for the plots can be read.
+fn assert_self_contained(html: &str, plots: usize, pictures: usize) {
+    assert!(html.starts_with("<!doctype html>") && html.trim_end().ends_with("</html>"));
+    for reference in ["http://", "https://", "src=\"/", "href=", "@import", "url("] {
+        assert!(!html.contains(reference), "refers to something else by {reference}");
+    }
+    assert_eq!(html.matches("data:image/png;base64,").count(), pictures);
+    let mut found = 0;
+    for part in html.split("<script type=\"application/json\">").skip(1) {
+        let json = part.split("</script>").next().unwrap();
+        let value: serde_json::Value = serde_json::from_str(json).unwrap();
+        for plot in value["plots"].as_array().unwrap() {
+            found += 1;
+            for series in plot["series"].as_array().unwrap() {
+                let times = &value["times"][series["time"].as_u64().unwrap() as usize];
+                let values = series["ys"].as_array().unwrap();
+                assert_eq!(times.as_array().unwrap().len(), values.len(), "{}", plot["title"]);
+                assert!(values.iter().any(|v| v.is_number()), "{} is empty", plot["title"]);
+            }
+        }
+    }
+    assert_eq!(found, plots);
+}
+
+/// Would catch a demo that fails, forgets to say that it is in virtual time, or shows a scene without contact.
+#[test]
+fn demo_shows_the_jaws_in_contact() {
+    let folder = Folder::new("demo");
+    let output = hapteron(&folder, &["demo"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(stderr(&output).contains("virtual time"), "{}", stderr(&output));
+    assert!(stdout(&output).contains("stable") && stdout(&output).contains("runs/demo/report.html"));
+    assert!(stdout(&output).contains("never crossed"), "{}", stdout(&output));
+    assert_self_contained(&folder.read("runs/demo/report.html"), 7, 3);
+}
+
+/// Would catch an experiment of the paper that no longer comes out, or a report without it.
+#[test]
+fn reproduce_holds_every_row() {
+    let folder = Folder::new("reproduce");
+    let output = hapteron(&folder, &["reproduce", "--out", "r"]);
+    assert!(output.status.success(), "{}{}", stdout(&output), stderr(&output));
+    let text = stdout(&output);
+    assert!(!text.contains("does not hold") && text.contains("26 of 26 rows hold"), "{text}");
+    let html = folder.read("r/report.html");
+    assert_self_contained(&html, 2 + 3 + 9, 0);
+    for figure in ["Fig. 2", "Fig. 4", "Fig. 6"] {
+        assert!(text.contains(figure) && html.contains(figure), "{figure}");
+    }
+    for curve in
+        ["r/fig2/backward-euler-10-g.csv", "r/fig4/backward-euler-10-g-2-kn-m.csv", "r/fig6/with-100-hz.csv"]
+    {
+        assert!(folder.read(curve).starts_with("t,handle_px"), "{curve}");
+    }
+}
+
+/// Would catch a comparison that mixes up the runs or misses a difference.
+#[test]
+fn compare_puts_two_runs_side_by_side() {
+    let folder = Folder::new("compare");
+    hapteron(&folder, &["models", "m"]);
+    for (name, stiffness) in [("soft", "1000"), ("hard", "8000")] {
+        let set = format!("contact.stiffness={stiffness}");
+        let run = ["run", "m/spoon_in_cup.toml", "--virtual-time", "--set", &set, "--out", name];
+        let output = hapteron(&folder, &run);
+        assert!(output.status.success(), "{}", stderr(&output));
+    }
+    let output = hapteron(&folder, &["compare", "soft", "hard/run.csv"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = stdout(&output);
+    let header: Vec<&str> = text.lines().next().unwrap().split_whitespace().collect();
+    assert_eq!(header, ["soft", "hard", "difference"]);
+    let depth = text.lines().find(|l| l.starts_with("greatest penetration")).unwrap();
+    let numbers: Vec<f64> = depth.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+    assert!(numbers[1] < numbers[0] && numbers[2] < 0.0, "{depth}");
+    assert_self_contained(&folder.read("runs/compare/report.html"), 6, 0);
+    let same = stdout(&hapteron(&folder, &["compare", "soft", "soft", "--out", "c"]));
+    let rms = same.lines().find(|l| l.starts_with("rms difference of feedback")).unwrap();
+    assert!(rms.ends_with("0.0000 N"), "{rms}");
+    fails(&folder, 1, &["compare", "soft", "nowhere"], &["nowhere"]);
+    folder.file("other.csv", "a,b\n1,2\n");
+    fails(&folder, 1, &["compare", "soft", "other.csv"], &["other.csv", "line 1"]);
+}
+
+/// Would catch a scene that starts wedged without a word.
+#[test]
+fn a_start_inside_the_obstacle_is_told() {
+    let folder = Folder::new("inside");
+    folder.file(
+        "s.toml",
+        "[body]\nmesh = \"builtin:spoon\"\nmass = 0.01\n[[obstacle]]\nmesh = \"builtin:spoon\"\nposition = [0, 0, 0.001]\n\
+         [hand]\ntrajectory = \"t.csv\"\n",
+    );
+    folder.file("t.csv", "t,px,py,pz,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n0.02,0,0,0,1,0,0,0\n");
+    let output = hapteron(&folder, &["run", "s.toml", "--virtual-time", "--out", "r"]);
+    assert!(stderr(&output).contains("already cross"), "{}", stderr(&output));
+    assert!(folder.read("r/report.html").contains("already cross"));
+}
