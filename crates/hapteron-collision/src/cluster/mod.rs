@@ -1,4 +1,4 @@
-//! Contact clusters: a few representatives for many contacts, by weighted K-means (section 6.1 and reference [20]).
+//! Contact clusters: a few representatives for many contacts, by weighted K-means (section 6.1 and reference 20).
 //!
 //! A contact weighs `weight * (tolerance + depth)`, so it is born and dies without weight and a representative moves
 //! continuously while contacts come and go. Clusters keep their number between queries: each starts from where the last
