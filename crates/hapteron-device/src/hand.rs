@@ -103,6 +103,7 @@ mod tests {
             orientation: UnitQuaternion::identity(),
             linear_velocity: Vector3::zeros(),
             angular_velocity: Vector3::zeros(),
+            buttons: 0,
         }
     }
 

@@ -3,9 +3,11 @@
 //! Here live the sample and the command, the scaling between the device's workspace and the virtual world, and the hand
 //! that stands in for a person. What never lives here: meshes, the dynamics of the body, files. SI units, world axes.
 
+mod device;
 mod hand;
 mod scaling;
 
+pub use device::{Applied, Capabilities, Control, Device, DeviceFault, Pacing};
 pub use hand::{Hand, HandError, HandParameters};
 pub use scaling::{Scaling, ScalingError};
 
@@ -24,6 +26,8 @@ pub struct DeviceSample {
     pub linear_velocity: Vector3<f64>,
     /// rad/s, world axes.
     pub angular_velocity: Vector3<f64>,
+    /// Bit i is set while button i is down.
+    pub buttons: u32,
 }
 
 /// What the handle is to push the hand with.

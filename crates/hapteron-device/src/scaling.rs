@@ -79,6 +79,7 @@ mod tests {
             orientation: UnitQuaternion::identity(),
             linear_velocity: Vector3::new(1.0, 2.0, 3.0),
             angular_velocity: Vector3::new(-1.0, 0.5, 2.0),
+            buttons: 0,
         };
         let command =
             DeviceCommand { force: Vector3::new(3.0, -1.0, 2.0), torque: Vector3::new(0.1, 0.3, 0.2) };

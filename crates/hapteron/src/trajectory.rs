@@ -182,6 +182,7 @@ impl Trajectory {
             orientation: pose.rotation,
             linear_velocity,
             angular_velocity,
+            buttons: 0,
         }
     }
 
