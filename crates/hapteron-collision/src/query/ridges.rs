@@ -7,11 +7,11 @@ use super::result::{Found, Sink};
 use super::side::Side;
 use super::vertices::Scratch;
 use super::walk::{Neighbourhood, Neighbours};
-use crate::surface::{Edge, EdgeKind, LANES, Surface};
+use crate::surface::{Cone, Edge, EdgeKind, LANES, Leaf, Surface};
 use crate::vector::{Rigid, Vec3, add, cross, dot, norm, scale, sub, unit_or};
 
 /// Slack of the test whether a direction lies in an edge's normal cone (its cosine; the cones are in single precision).
-const CONE_SLACK: f64 = 1e-4;
+const CONE_SLACK: f64 = Cone::SLACK as f64;
 /// The middle of an edge shows more than its ends when it is closer to the other surface by this share of the tolerance.
 const WORTH: f64 = 0.1;
 /// Edges closer than this (metres) have no direction between them.
@@ -24,6 +24,8 @@ pub(super) struct Ridges {
     /// By leaf of the obstacle: its range of `blocks`, when gathered.
     range: Vec<Option<(u32, u32)>>,
     gathered: Vec<u32>,
+    /// The leaves that a leaf of the body faces.
+    facing: Vec<u32>,
 }
 
 /// An edge of the body in the obstacle's frame.
@@ -32,6 +34,7 @@ struct Ridge {
     along: Vec3,
     outward: Vec3,
     within: f64,
+    cone: Cone,
     index: u32,
 }
 
@@ -71,6 +74,11 @@ impl Ridges {
                     block.along[axis][lane] = b[axis] - a[axis];
                 }
                 block.within_squared[lane] = within * within;
+                let cone = Cone::wide(edge.normal, edge.cone);
+                for axis in 0..3 {
+                    block.normal[axis][lane] = cone.axis[axis];
+                }
+                (block.cos[lane], block.sin[lane]) = (cone.cos, cone.sin);
                 block.edge[lane] = index;
             }
             lane += 1;
@@ -85,7 +93,7 @@ impl Ridges {
 /// How close the middle of an edge must come to another edge to show more than its ends do; zero when an end lies inside.
 #[inline(always)]
 fn reach(edge: &Edge, side: &Side, pair: Pair<'_>, least: f64) -> f64 {
-    let [a, b] = edge.vertices.map(|v| side.signed[v as usize]);
+    let [a, b] = edge.vertices.map(|v| side.signed_distance(v));
     let ends = a.min(b);
     if ends <= 0.0 {
         0.0
@@ -111,13 +119,16 @@ pub(super) fn find(
     // Edges may only show more than the vertices did, so the vertices' least distance is what they must beat.
     let least = sink.least.min(pair.tolerance);
     for &Neighbourhood { leaf, begin, end } in &neighbours.of {
-        let near = &neighbours.near[begin as usize..end as usize];
-        scratch.clear();
-        for eight in near.chunks(LANES) {
-            scratch.push(LeafBounds::gather(pair.obstacle, eight));
-        }
         let own = &pair.body.leaves[leaf as usize];
-        for index in own.first_edge..own.first_edge + u32::from(own.ridges) {
+        let near = &neighbours.near[begin as usize..end as usize];
+        let mut facing = core::mem::take(&mut ridges.facing);
+        facing_leaves(pair, own, near, &mut facing);
+        scratch.bounds.clear();
+        for eight in facing.chunks(LANES) {
+            scratch.bounds.push(LeafBounds::gather(pair.obstacle, eight));
+        }
+        let edges = if facing.is_empty() { 0 } else { u32::from(own.ridges) };
+        for index in own.first_edge..own.first_edge + edges {
             let edge = &pair.body.edges[index as usize];
             let within = reach(edge, body, pair, least);
             if within <= 0.0 {
@@ -126,7 +137,7 @@ pub(super) fn find(
             let ridge = moved(pair.body, edge, index, within, pair.motion);
             let bounds = bounds(&ridge);
             let ends = [ridge.start, add(ridge.start, ridge.along)].map(|p| p.map(|c| c as f32));
-            for (eight, leaf_bounds) in near.chunks(LANES).zip(scratch.iter()) {
+            for (eight, leaf_bounds) in facing.chunks(LANES).zip(scratch.bounds.iter()) {
                 let lower = leaf_bounds.segment_lower(&bounds, ends, slack);
                 for (&other, &lower) in eight.iter().zip(&lower) {
                     if f64::from(lower) >= within && lower > 0.0 {
@@ -136,18 +147,39 @@ pub(super) fn find(
                     let crossing = if lower <= 0.0 { pair.tolerance } else { 0.0 };
                     let (first, last) = ridges.gather(pair, obstacle, other, least);
                     for block in &ridges.blocks[first as usize..last as usize] {
-                        meet(pair, &ridge, block, crossing * crossing, sink);
+                        if block.facing(&ridge.cone) != 0 {
+                            meet(pair, &ridge, block, crossing * crossing, sink);
+                        }
                     }
                 }
             }
         }
+        ridges.facing = facing;
     }
+}
+
+/// Those of the near leaves whose ridges can touch some ridge of a leaf of the body: surfaces touch where their normals are opposite.
+#[inline(always)]
+fn facing_leaves(pair: Pair<'_>, own: &Leaf, near: &[u32], facing: &mut Vec<u32>) {
+    facing.clear();
+    if own.ridges == 0 {
+        return;
+    }
+    let axis = pair.motion.direction(own.ridge_cone.axis.map(f64::from)).map(|c| c as f32);
+    facing.extend(near.iter().copied().filter(|&other| {
+        let other = &pair.obstacle.leaves[other as usize];
+        let Cone { axis: theirs, cos, sin } = other.ridge_cone;
+        let aligned = axis[0] * theirs[0] + axis[1] * theirs[1] + axis[2] * theirs[2];
+        other.ridges > 0 && own.ridge_cone.faces(cos, sin, aligned)
+    }));
 }
 
 #[inline(always)]
 fn moved(surface: &Surface, edge: &Edge, index: u32, within: f64, motion: &Rigid) -> Ridge {
     let [a, b] = edge.vertices.map(|v| motion.point(surface.vertices[v as usize]));
-    Ridge { start: a, along: sub(b, a), outward: motion.direction(edge.normal.map(f64::from)), within, index }
+    let outward = motion.direction(edge.normal.map(f64::from));
+    let cone = Cone::wide(outward.map(|c| c as f32), edge.cone);
+    Ridge { start: a, along: sub(b, a), outward, within, cone, index }
 }
 
 #[inline(always)]
