@@ -1,8 +1,8 @@
 //! The inner loops, eight lanes at a time. Branch-free, so that the compiler turns them into vector instructions; every
 //! lane is the same IEEE arithmetic on any machine.
 
-use crate::surface::{Cone, LANES, Node, Surface, TriangleBlock};
-use crate::vector::{Rigid, Vec3};
+use crate::surface::{LANES, Node, Surface, TriangleBlock};
+use crate::vector::Rigid;
 
 /// An axis-aligned box in single precision, rounded outward.
 #[derive(Clone, Copy, Debug)]
@@ -84,33 +84,6 @@ impl LeafBounds {
             squared[l] = if slab > sum { slab } else { sum };
         }
         squared
-    }
-}
-
-impl LeafBounds {
-    /// Lower bounds of the distances of a segment, with its box, to the leaves.
-    #[inline(always)]
-    pub(super) fn segment_lower(&self, b: &Box32, ends: [[f32; 3]; 2], slack: f32) -> [f32; LANES] {
-        let mut lower = [0.0; LANES];
-        for l in 0..LANES {
-            let mut least: f32 = 0.0;
-            let mut heights = [0.0; 2];
-            for k in 0..3 {
-                let (under, over) = (self.min[k][l] - b.max[k], b.min[k] - self.max[k][l]);
-                least = if under > least { under } else { least };
-                least = if over > least { over } else { least };
-                heights[0] += self.normal[k][l] * ends[0][k];
-                heights[1] += self.normal[k][l] * ends[1][k];
-            }
-            let descending = heights[0] > heights[1];
-            let lowest = if descending { heights[1] } else { heights[0] };
-            let highest = if descending { heights[0] } else { heights[1] };
-            let (under, over) = (self.low[l] - highest, lowest - self.high[l]);
-            least = if under > least { under } else { least };
-            least = if over > least { over } else { least };
-            lower[l] = least - slack;
-        }
-        lower
     }
 }
 
@@ -239,82 +212,4 @@ pub(super) fn at_most(values: &[f32; LANES], limit: f32) -> u32 {
         hit[l] = u32::from(values[l] <= limit) << l;
     }
     hit.iter().fold(0, |mask, h| mask | h)
-}
-
-/// Eight edges as a start and a vector to the end, by axis and lane, with the distance within which each is of interest.
-#[derive(Clone, Debug)]
-#[repr(align(64))]
-pub(super) struct RidgeBlock {
-    pub start: [[f64; LANES]; 3],
-    pub along: [[f64; LANES]; 3],
-    pub within_squared: [f64; LANES],
-    /// Normal cones of the edges.
-    pub normal: [[f32; LANES]; 3],
-    pub cos: [f32; LANES],
-    pub sin: [f32; LANES],
-    pub edge: [u32; LANES],
-}
-
-impl RidgeBlock {
-    /// Lanes that meet nothing.
-    pub(super) const EMPTY: Self = Self {
-        start: [[0.0; LANES]; 3],
-        along: [[0.0; LANES]; 3],
-        within_squared: [0.0; LANES],
-        normal: [[0.0; LANES]; 3],
-        cos: [1.0; LANES],
-        sin: [0.0; LANES],
-        edge: [u32::MAX; LANES],
-    };
-
-    /// Bit `i` is set when a surface with edge `i` and one with an edge of this normal cone can touch there.
-    #[inline(always)]
-    pub(super) fn facing(&self, cone: &Cone) -> u32 {
-        let mut hit = [0u32; LANES];
-        for l in 0..LANES {
-            let aligned = cone.axis[0] * self.normal[0][l]
-                + cone.axis[1] * self.normal[1][l]
-                + cone.axis[2] * self.normal[2][l];
-            hit[l] = u32::from(cone.faces(self.cos[l], self.sin[l], aligned)) << l;
-        }
-        hit.iter().fold(0, |mask, h| mask | h)
-    }
-}
-
-/// Bit `i` is set when the middle of the edge from `p` along `d` is close to the middle of edge `i` of the block: the
-/// common perpendicular meets both between their ends and is short enough, or, on the inner side (against `outward`),
-/// shorter than `crossing_squared`.
-#[inline(always)]
-pub(super) fn ridge_ridges(
-    p: Vec3,
-    d: Vec3,
-    outward: Vec3,
-    within_squared: f64,
-    crossing_squared: f64,
-    block: &RidgeBlock,
-) -> u32 {
-    let mut hit = [0u64; LANES];
-    let a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    for l in 0..LANES {
-        let e = [block.along[0][l], block.along[1][l], block.along[2][l]];
-        let r = [p[0] - block.start[0][l], p[1] - block.start[1][l], p[2] - block.start[2][l]];
-        let ee = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
-        let b = d[0] * e[0] + d[1] * e[1] + d[2] * e[2];
-        let c = d[0] * r[0] + d[1] * r[1] + d[2] * r[2];
-        let f = e[0] * r[0] + e[1] * r[1] + e[2] * r[2];
-        let whole = a * ee - b * b;
-        let inverse = 1.0 / whole;
-        let s = (b * f - c * ee) * inverse;
-        let t = (a * f - b * c) * inverse;
-        // From the point on the first edge to that on the block's.
-        let u = [e[0] * t - d[0] * s - r[0], e[1] * t - d[1] * s - r[1], e[2] * t - d[2] * s - r[2]];
-        let squared = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
-        let side = u[0] * outward[0] + u[1] * outward[1] + u[2] * outward[2];
-        let limit = within_squared.min(block.within_squared[l]);
-        let limit = if side < 0.0 { crossing_squared } else { limit };
-        // Comparisons with a NaN (parallel edges) are false.
-        let inside = (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0) & (squared < limit);
-        hit[l] = u64::from(inside) << l;
-    }
-    hit.iter().fold(0, |mask, h| mask | h) as u32
 }

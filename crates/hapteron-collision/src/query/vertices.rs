@@ -117,12 +117,8 @@ fn run(search: &Search<'_>, side: &mut Side, scratch: &mut Scratch, mut push: im
         look_elsewhere(search, scratch);
         settle(search, scratch);
         for probe in &scratch.probes {
-            let Some((triangle, foot)) = probe.best else {
-                side.set_last_leaf(probe.vertex, None);
-                continue;
-            };
-            side.set_last_leaf(probe.vertex, Some(triangle / LANES as u32));
-            side.set(probe.vertex, foot.signed_distance);
+            let Some((triangle, foot)) = probe.best else { continue };
+            side.set(probe.vertex, foot.signed_distance, triangle / LANES as u32);
             push(probe.vertex, probe.point, &foot);
         }
         scratch.probes.clear();

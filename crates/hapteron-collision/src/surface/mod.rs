@@ -76,7 +76,14 @@ impl Cone {
         Self { axis, cos, sin: (1.0 - cos * cos).max(0.0).sqrt() }
     }
 
-    /// True when some direction of this cone may be opposite to one of the other's; `aligned` is the cosine between the axes.
+    /// True when some direction of this cone may be opposite to one of the other.
+    #[inline(always)]
+    pub(crate) fn faces_cone(&self, other: &Self) -> bool {
+        let aligned = (0..3).map(|k| self.axis[k] * other.axis[k]).sum();
+        self.faces(other.cos, other.sin, aligned)
+    }
+
+    /// The same for a cone of this cosine and sine; `aligned` is the cosine between the axes.
     #[inline(always)]
     pub(crate) fn faces(&self, other_cos: f32, other_sin: f32, aligned: f32) -> bool {
         // The angle between one axis and the reverse of the other is at most the sum of the angles.
