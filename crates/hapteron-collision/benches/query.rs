@@ -2,6 +2,7 @@
 //!
 //! The built-in jaws are always measured; the real pairs when their data are there. `cold`: each pose alone, with a workspace that knows nothing;
 //! `1 kHz`: along the motion, 30 queries from each pose to the next, with one workspace. Medians, milliseconds, one core. The peer lists every pair of close triangles.
+//! `B/tri`: memory of the two structures, bytes a triangle. Names of pairs as arguments choose among them.
 #![allow(clippy::unwrap_used)]
 
 use hapteron_collision::mesh::{TriMesh, load};
@@ -26,10 +27,11 @@ struct Pair {
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     println!(
-        "{:<12} {:>6} {:>9} {:>9} {:>9} {:>8} {:>10} {:>10} {:>6} {:>6}",
+        "{:<12} {:>6} {:>9} {:>7} {:>9} {:>9} {:>8} {:>10} {:>10} {:>6} {:>6}",
         "pair",
         "d mm",
         "triangles",
+        "B/tri",
         "cold ms",
         "1 kHz ms",
         "contacts",
@@ -76,10 +78,12 @@ fn measure(pair: &Pair) {
     let [parry_cold, parry_warm] = peer(pair, &motion);
     let (cold, warm) = (median(cold) * 1e3, median(warm) * 1e3);
     println!(
-        "{:<12} {:>6} {:>9} {:>9.4} {:>9.4} {:>8.0} {:>10.3} {:>10.3} {:>6.1} {:>6.1}",
+        "{:<12} {:>6} {:>9} {:>7.1} {:>9.4} {:>9.4} {:>8.0} {:>10.3} {:>10.3} {:>6.1} {:>6.1}",
         pair.name,
         pair.tolerance * 1e3,
-        pair.body.triangles().len() + pair.obstacle.triangles().len(),
+        body.triangle_count() + obstacle.triangle_count(),
+        (body.memory_bytes() + obstacle.memory_bytes()) as f64
+            / (body.triangle_count() + obstacle.triangle_count()) as f64,
         cold,
         warm,
         median(contacts),

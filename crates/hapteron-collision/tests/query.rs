@@ -181,38 +181,31 @@ fn all_that_is_near_has_a_contact_nearby() {
     assert!(judged > 500, "{judged}");
 }
 
-/// Would catch memory that changes a result: the queries along a motion are those of a workspace that knows nothing.
+/// Would catch memory that changes a result or its order: the queries along motions from fast to slow, with jumps and changes of the
+/// tolerance between them, are to the bit those of a workspace that knows nothing.
 #[test]
 fn memory_never_changes_a_result() {
     let (body, obstacle) = (Surface::build(&ring(40, 16, 0.8, 0.25)), Surface::build(&bumpy_ball(4, 0.06)));
     let mut random = Random::new(3);
     let mut workspace = QueryWorkspace::new();
     let mut seen = 0;
-    for jump in 0..20 {
+    for jump in 0..28 {
         let (start, drift) = (random.pose(0.5), random.pose(1.0));
         // From a step far larger than the tolerance to one far smaller.
-        let step = 0.3 * 0.5f64.powi(jump);
-        for k in 0..12 {
+        let step = 0.3 * 0.6f64.powi(jump);
+        for k in 0..24 {
             let moved = drift.translation.vector * (step * f64::from(k));
-            let pose = Isometry3::from_parts((start.translation.vector + moved).into(), start.rotation);
+            let turned =
+                nalgebra::UnitQuaternion::new(drift.translation.vector * (0.3 * step * f64::from(k)));
+            let pose =
+                Isometry3::from_parts((start.translation.vector + moved).into(), turned * start.rotation);
             let still = Isometry3::identity();
+            let tolerance = TOLERANCE * [1.0, 1.0, 0.6, 1.3][(k / 2 % 4) as usize];
             let mut fresh = QueryWorkspace::new();
-            let cold = query(&body, &pose, &obstacle, &still, TOLERANCE, &mut fresh);
-            let warm = query(&body, &pose, &obstacle, &still, TOLERANCE, &mut workspace);
-            assert_eq!(cold.contacts.len(), warm.contacts.len(), "{jump} {k}");
-            assert!(
-                (cold.min_distance - warm.min_distance).abs() < 1e-12
-                    || cold.min_distance == warm.min_distance
-            );
-            let key = |c: &Contact| (c.body_feature, c.obstacle_feature);
-            let sorted = |list: &[Contact]| {
-                let mut list = list.to_vec();
-                list.sort_by_key(key);
-                list
-            };
-            for (a, b) in sorted(cold.contacts).iter().zip(&sorted(warm.contacts)) {
-                assert!((a.depth - b.depth).abs() < 1e-12, "{jump} {k}: {a:?} {b:?}");
-            }
+            let cold = query(&body, &pose, &obstacle, &still, tolerance, &mut fresh);
+            let warm = query(&body, &pose, &obstacle, &still, tolerance, &mut workspace);
+            assert_eq!(cold.min_distance, warm.min_distance, "{jump} {k}");
+            assert_eq!(cold.contacts, warm.contacts, "{jump} {k}");
             seen += cold.contacts.len();
         }
     }

@@ -213,3 +213,45 @@ pub(super) fn at_most(values: &[f32; LANES], limit: f32) -> u32 {
     }
     hit.iter().fold(0, |mask, h| mask | h)
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::mesh::TriMesh;
+    use crate::query::feature;
+
+    /// Would catch a distance in single precision that is farther off than the block says, thin and tiny triangles included: then
+    /// the closest triangle could be missed.
+    #[test]
+    fn distances_to_a_block_are_as_certain_as_it_says() {
+        let mut seed = 7u64;
+        let mut number = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let mut inside = 0;
+        for round in 0..4000 {
+            // From equilateral to a millionth as high as wide, far from the origin, up to a metre in size.
+            let (thin, size) = (0.1f64.powi(round % 7), 0.1f64.powi(round / 7 % 5));
+            let a = [0; 3].map(|_| 5.0 * number());
+            let side = [0; 3].map(|_| size * number());
+            let b = crate::vector::add(a, side);
+            let along = number();
+            let c = [0, 1, 2].map(|k| a[k] + along * side[k] + thin * size * number());
+            let Ok(mesh) = TriMesh::new(vec![a, b, c], vec![[0, 1, 2]]) else { continue };
+            let surface = Surface::build(&mesh);
+            let (leaf, block) = (&surface.leaves[0], &surface.blocks[0]);
+            for _ in 0..20 {
+                let p = a.map(|x| x + 1.5 * size * number());
+                let local = [0, 1, 2].map(|k| (p[k] - f64::from(block.origin[k])) as f32);
+                let found = f64::from(least(&point_triangles(local, block)).sqrt());
+                let exact = feature::foot(p, leaf.triangle(0), &surface).signed_distance.abs();
+                let error = f64::from(block.error) + f64::from(crate::surface::ERROR) * exact;
+                assert!((found - exact).abs() <= error, "{found} {exact} {error} {thin} {size}");
+                inside += 1;
+            }
+        }
+        assert!(inside > 50_000, "{inside}");
+    }
+}

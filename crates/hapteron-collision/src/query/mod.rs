@@ -37,6 +37,8 @@ struct Pair<'a> {
     motion: &'a Rigid,
     inverse: &'a Rigid,
     tolerance: f64,
+    /// Sum of the displacements of the body over the queries with this workspace, metres.
+    travelled: f64,
 }
 
 impl Pair<'_> {
@@ -67,6 +69,7 @@ struct Collected {
     reach: f64,
     /// The pose of the last query.
     last: Rigid,
+    travelled: f64,
 }
 
 impl QueryWorkspace {
@@ -76,20 +79,21 @@ impl QueryWorkspace {
         Self::default()
     }
 
-    /// Makes sure that the lists of near leaves hold all that can be within the tolerance.
-    fn collect(&mut self, pair: Pair<'_>) {
+    /// Makes sure that the lists of near leaves hold all that can be within the tolerance. Gives what the body has travelled.
+    fn collect(&mut self, pair: Pair<'_>) -> f64 {
         let surfaces = [pair.body.identity, pair.obstacle.identity];
         let Some(root) = pair.body.nodes.first() else {
-            return;
+            return 0.0;
         };
         let known = self.collected.filter(|known| known.surfaces == surfaces);
-        let mut step = 0.0;
+        let (mut step, mut travelled) = (0.0, 0.0);
         if let Some(known) = known {
             step = walk::displacement(root, &known.last, pair.motion);
+            travelled = known.travelled + step;
             let moved = walk::displacement(root, &known.motion, pair.motion);
             if pair.tolerance + moved <= known.reach {
-                self.collected = Some(Collected { last: *pair.motion, ..known });
-                return;
+                self.collected = Some(Collected { last: *pair.motion, travelled, ..known });
+                return travelled;
             }
         } else {
             self.body.reset(pair.body);
@@ -103,7 +107,17 @@ impl QueryWorkspace {
         };
         let reach = pair.tolerance + ahead;
         walk::walk(pair, reach, &mut self.walk);
-        self.collected = Some(Collected { surfaces, motion: *pair.motion, reach, last: *pair.motion });
+        for (clear, neighbours) in [
+            (&mut self.body.clear, &self.walk.body),
+            (&mut self.obstacle.clear, &self.walk.obstacle),
+            (&mut self.ridges.clear, &self.walk.body),
+        ] {
+            clear.clear();
+            clear.resize(neighbours.of.len(), side::Clear::UNKNOWN);
+        }
+        let motion = *pair.motion;
+        self.collected = Some(Collected { surfaces, motion, reach, last: motion, travelled });
+        travelled
     }
 }
 
@@ -139,13 +153,13 @@ pub fn query<'a>(
     }
     let motion = Rigid::from_isometry(&relative);
     let inverse = Rigid::from_isometry(&relative.inverse());
-    let pair = Pair { body, obstacle, motion: &motion, inverse: &inverse, tolerance };
-    workspace.collect(pair);
+    let mut pair = Pair { body, obstacle, motion: &motion, inverse: &inverse, tolerance, travelled: 0.0 };
+    pair.travelled = workspace.collect(pair);
     let QueryWorkspace { walk, ridges, body: body_side, obstacle: obstacle_side, scratch, contacts, .. } =
         workspace;
     body_side.clear();
     obstacle_side.clear();
-    ridges.clear(obstacle);
+    ridges.forget(obstacle);
     let world_from_obstacle = Rigid::from_isometry(world_from_obstacle);
     let mut sink = Sink { pair, world_from_obstacle, contacts, least: f64::INFINITY };
     vertices::of_body(pair, &walk.body, body_side, scratch, &mut sink);

@@ -1,6 +1,7 @@
 //! The inner loops over edges, eight at a time; like those of the kernel, but in single precision throughout: what they
 //! let through is looked at again exactly, and what they refuse is certain.
 
+use super::kernel::least;
 use crate::surface::{Cone, LANES, Leaf};
 
 /// Bound of the accumulated rounding relative to the magnitudes of the factors: some 20 operations of half a unit in the last
@@ -28,9 +29,11 @@ impl SegmentBlock {
         self.within[lane] = within;
     }
 
-    /// Two masks: of the edges that may be as close to a leaf as they need to be, and of those that may meet its bounds.
+    /// Two masks: of the edges that may be as close to a leaf as they need to be, and of those that may meet its bounds; and a
+    /// lower bound of the distance of any of them.
     #[inline(always)]
-    pub(super) fn near(&self, leaf: &Leaf, slack: f32) -> (u32, u32) {
+    pub(super) fn near(&self, leaf: &Leaf, slack: f32) -> (u32, u32, f32) {
+        let mut distance = [0.0; LANES];
         let mut near = [0u32; LANES];
         let mut meeting = [0u32; LANES];
         for l in 0..LANES {
@@ -50,12 +53,13 @@ impl SegmentBlock {
             let (under, over) = (leaf.low - high - slack, low - leaf.high - slack);
             apart = if under > apart { under } else { apart };
             apart = if over > apart { over } else { apart };
+            distance[l] = apart;
             meeting[l] = u32::from((apart <= 0.0) & (self.within[l] > 0.0)) << l;
             near[l] = u32::from(apart < self.within[l]) << l;
         }
         let near = near.iter().fold(0, |mask, h| mask | h);
         let meeting = meeting.iter().fold(0, |mask, h| mask | h);
-        (near | meeting, meeting)
+        (near | meeting, meeting, least(&distance))
     }
 }
 
@@ -167,4 +171,51 @@ impl RidgeBlock {
 #[inline(always)]
 fn length(v: [f32; 3]) -> f32 {
     (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vector::{Vec3, add, dot, norm, scale, sub};
+
+    /// Would catch a pair of edges that is refused although their common perpendicular is short enough, meets both and lies in
+    /// both cones: nearly parallel ones, and ones that have passed each other, included.
+    #[test]
+    fn edges_that_touch_are_never_refused() {
+        let mut seed = 11u64;
+        let mut number = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let (mut touching, mut refused) = (0, 0);
+        for round in 0..200_000 {
+            let mut vector = || [number(), number(), number()];
+            let (d, mix) = (vector(), vector());
+            let e = add(scale(d, 1.0), scale(mix, 0.1f64.powi(round % 6)));
+            // Built from the perpendicular, so that many touch.
+            let u = crate::vector::unit_or_zero(crate::vector::cross(d, e));
+            let q: Vec3 = vector();
+            let (gap, s, t) = (0.02 * number(), 0.6 * number() + 0.5, 0.6 * number() + 0.5);
+            let p = add(q, scale(u, gap));
+            let (start, other) = (sub(p, scale(d, s)), sub(q, scale(e, t)));
+            let to32 = |v: Vec3| v.map(|c| c as f32);
+            let (within, crossing) = (0.01, if round % 2 == 0 { 0.015 } else { 0.0 });
+            let outward = scale(u, if round % 3 == 0 { 1.0 } else { -1.0 });
+            let mut block = RidgeBlock::empty([0.0; 3]);
+            let opposite = Cone::wide(to32(scale(outward, -1.0)), 0.999);
+            block.set(0, 0, [to32(other), to32(add(other, e))], opposite, within);
+            let cone = Cone::wide(to32(outward), 0.999);
+            let hit = block.meeting(to32(start), to32(d), &cone, within, crossing);
+            let between = s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
+            // From the first edge to the second it is against the normal when they have passed.
+            let limit = if dot(sub(q, p), outward) < 0.0 { crossing } else { within };
+            if between && gap.abs() < f64::from(limit) && norm(u) > 0.5 {
+                touching += 1;
+                assert_eq!(hit, 1, "{round}: {s} {t} {gap}");
+            } else if hit == 0 {
+                refused += 1;
+            }
+        }
+        assert!(touching > 20_000 && refused > 20_000, "{touching} {refused}");
+    }
 }

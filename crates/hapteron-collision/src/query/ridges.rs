@@ -4,7 +4,7 @@ use super::Pair;
 use super::feature::Feature;
 use super::result::{Found, Sink};
 use super::ridge_kernel::{RidgeBlock, SegmentBlock};
-use super::side::Side;
+use super::side::{Clear, Side};
 use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{Cone, Edge, EdgeKind, LANES, Leaf, Surface};
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or};
@@ -27,6 +27,8 @@ pub(super) struct Ridges {
     /// The edges of a leaf of the body, and eight at a time.
     own: Vec<Ridge>,
     segments: Vec<SegmentBlock>,
+    /// By neighbourhood of the body in the last walk.
+    pub clear: Vec<Clear>,
 }
 
 /// An edge of the body in the obstacle's frame.
@@ -41,7 +43,7 @@ struct Ridge {
 }
 
 impl Ridges {
-    pub(super) fn clear(&mut self, obstacle: &Surface) {
+    pub(super) fn forget(&mut self, obstacle: &Surface) {
         for &leaf in &self.gathered {
             self.range[leaf as usize] = [0; 2];
         }
@@ -143,7 +145,11 @@ pub(super) fn find(
     let slack = pair.slack() as f32;
     // Edges may only show more than the vertices did, so the vertices' least distance is what they must beat.
     let least = sink.least.min(pair.tolerance);
-    for &Neighbourhood { leaf, begin, end } in &neighbours.of {
+    let first = sink.contacts.len();
+    for (i, &Neighbourhood { leaf, begin, end }) in neighbours.of.iter().enumerate() {
+        if ridges.clear[i].holds(pair.travelled, pair.tolerance) {
+            continue;
+        }
         let own = &pair.body.leaves[leaf as usize];
         ridges.gather_own(pair, body, own, least);
         if ridges.own.is_empty() {
@@ -151,13 +157,19 @@ pub(super) fn find(
         }
         let axis = pair.motion.direction(own.ridge_cone.axis.map(f64::from)).map(|c| c as f32);
         let cone = Cone { axis, ..own.ridge_cone };
+        // Directions change as the body turns, distances by no more than it travels.
+        let all = ridges.own.len() == usize::from(own.ridges);
+        let mut lower = f32::INFINITY;
         for &other in &neighbours.near[begin as usize..end as usize] {
             let theirs = &pair.obstacle.leaves[other as usize];
-            if theirs.ridges == 0 || !cone.faces_cone(&theirs.ridge_cone) {
+            let facing = theirs.ridges > 0 && cone.faces_cone(&theirs.ridge_cone);
+            if !facing && !all {
                 continue;
             }
             for eight in 0..ridges.segments.len() {
-                let (mut mask, meeting) = ridges.segments[eight].near(theirs, slack);
+                let (mut mask, meeting, apart) = ridges.segments[eight].near(theirs, slack);
+                lower = if apart < lower { apart } else { lower };
+                mask = if facing { mask } else { 0 };
                 while mask != 0 {
                     let lane = mask.trailing_zeros() as usize;
                     mask &= mask - 1;
@@ -171,7 +183,12 @@ pub(super) fn find(
                 }
             }
         }
+        if all {
+            ridges.clear[i] = Clear::new(f64::from(lower), pair.travelled);
+        }
     }
+    // The order of near leaves depends on how far ahead the walk looked.
+    sink.contacts[first..].sort_unstable_by_key(|c| (c.body_feature, c.obstacle_feature));
 }
 
 #[inline(always)]

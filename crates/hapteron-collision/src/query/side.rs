@@ -13,6 +13,28 @@ pub(super) struct Side {
     results: Vec<Page>,
     /// Vertices with a signed distance, in the order found.
     found: Vec<u32>,
+    /// By neighbourhood of the last walk.
+    pub clear: Vec<Clear>,
+}
+
+/// How far the body must have travelled before something can come within a distance: a lower bound of the distance when it
+/// was last looked at, plus what the body had travelled by then. While that is less, there is no need to look.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Clear(f64);
+
+impl Clear {
+    pub(super) const UNKNOWN: Self = Self(f64::NEG_INFINITY);
+
+    #[inline(always)]
+    pub(super) fn new(lower: f64, travelled: f64) -> Self {
+        Self(lower + travelled)
+    }
+
+    /// True when nothing can be closer than `distance` now.
+    #[inline(always)]
+    pub(super) fn holds(self, travelled: f64, distance: f64) -> bool {
+        self.0 - travelled >= distance
+    }
 }
 
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use super::Pair;
 use super::feature::{self, Feature, Foot};
 use super::kernel::{self, LeafBounds};
 use super::result::{Found, Sink};
-use super::side::Side;
+use super::side::{Clear, Side};
 use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{ERROR, LANES, Surface, VertexNormal};
 use crate::vector::{Rigid, Vec3, dot, scale};
@@ -17,6 +17,8 @@ struct Search<'a> {
     /// From the own frame to the other's.
     motion: &'a Rigid,
     tolerance: f64,
+    /// What the body has travelled, metres.
+    travelled: f64,
     /// Rounding of single-precision coordinates, metres.
     slack: f32,
     /// Rounding of a distance within the tolerance, to which that of a block is added, metres.
@@ -74,6 +76,7 @@ pub(super) fn of_body(
         neighbours,
         motion: pair.motion,
         tolerance: pair.tolerance,
+        travelled: pair.travelled,
         slack: pair.slack() as f32,
         error: ERROR * pair.tolerance as f32,
     };
@@ -95,6 +98,7 @@ pub(super) fn of_obstacle(
         neighbours,
         motion: pair.inverse,
         tolerance: pair.tolerance,
+        travelled: pair.travelled,
         slack: pair.slack() as f32,
         error: ERROR * pair.tolerance as f32,
     };
@@ -108,7 +112,11 @@ const BATCH: usize = 64;
 fn run(search: &Search<'_>, side: &mut Side, scratch: &mut Scratch, mut push: impl FnMut(u32, Vec3, &Foot)) {
     scratch.probes.clear();
     for (i, neighbourhood) in search.neighbours.of.iter().enumerate() {
-        probes_of_leaf(search, side, scratch, neighbourhood);
+        let clear = side.clear[i].holds(search.travelled, search.tolerance + f64::from(search.slack));
+        if !clear {
+            let lower = probes_of_leaf(search, side, scratch, neighbourhood);
+            side.clear[i] = Clear::new(lower, search.travelled);
+        }
         let last = i + 1 == search.neighbours.of.len();
         if scratch.probes.len() < BATCH && !last {
             continue;
@@ -126,9 +134,9 @@ fn run(search: &Search<'_>, side: &mut Side, scratch: &mut Scratch, mut push: im
     }
 }
 
-/// Makes a probe of every vertex of a leaf that may be within the tolerance of a near leaf.
+/// Makes a probe of every vertex of a leaf that may be within the tolerance of a near leaf. Gives a lower bound of the distances.
 #[inline(always)]
-fn probes_of_leaf(search: &Search<'_>, side: &Side, scratch: &mut Scratch, of: &Neighbourhood) {
+fn probes_of_leaf(search: &Search<'_>, side: &Side, scratch: &mut Scratch, of: &Neighbourhood) -> f64 {
     let &Neighbourhood { leaf, begin, end } = of;
     let near = &search.neighbours.near[begin as usize..end as usize];
     scratch.bounds.clear();
@@ -138,6 +146,7 @@ fn probes_of_leaf(search: &Search<'_>, side: &Side, scratch: &mut Scratch, of: &
     let within = (search.tolerance as f32).next_up();
     let limit = within * within * ROUNDING;
     let own = &search.own.leaves[leaf as usize];
+    let mut closest = f32::INFINITY;
     for vertex in own.first_vertex..own.first_vertex + u32::from(own.vertices) {
         let point = search.motion.point(search.own.vertices[vertex as usize]);
         let point32 = point.map(|c| c as f32);
@@ -152,6 +161,7 @@ fn probes_of_leaf(search: &Search<'_>, side: &Side, scratch: &mut Scratch, of: &
             }
             scratch.lowers.push(lower);
         }
+        closest = if least.0 < closest { least.0 } else { closest };
         if !(least.0 < limit) {
             scratch.lowers.truncate(lowers);
             continue;
@@ -161,6 +171,7 @@ fn probes_of_leaf(search: &Search<'_>, side: &Side, scratch: &mut Scratch, of: &
         let lowers = lowers as u32;
         scratch.probes.push(Probe { vertex, point, within, guess, begin, end, lowers, best: None });
     }
+    f64::from(closest.sqrt() / ROUNDING)
 }
 
 #[inline(always)]
