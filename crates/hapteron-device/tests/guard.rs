@@ -138,7 +138,8 @@ fn what_stays_away_for_a_second_is_a_fault() {
 /// Would catch a fault that is not seen, is seen too early, or keeps the force.
 #[test]
 fn over_speed_clock_and_simulation_faults_latch() {
-    let cases: [(GuardFault, u32, fn(&mut GuardInput)); 5] = [
+    type Change = fn(&mut GuardInput);
+    let cases: [(GuardFault, u32, Change); 5] = [
         (GuardFault::OverSpeed, 3, |i| i.sample.linear_velocity.x = 2.1),
         (GuardFault::OverSpeed, 3, |i| i.sample.angular_velocity.x = -31.0),
         (GuardFault::Clock, 20, |i| i.time = 0.3),

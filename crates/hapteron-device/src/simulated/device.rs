@@ -95,6 +95,11 @@ impl SimulatedDevice {
     pub fn new(settings: SimulatedSettings, goal: &DeviceSample) -> Result<Self, SimulatedError> {
         check(&settings)?;
         let tremor = Tremor::new(settings.tremor, settings.seed);
+        let mut sample = *goal;
+        if !settings.model.senses_rotation {
+            sample.orientation = UnitQuaternion::identity();
+            sample.angular_velocity = Vector3::zeros();
+        }
         Ok(Self {
             settings,
             capabilities: settings.model.capabilities(),
@@ -103,7 +108,7 @@ impl SimulatedDevice {
             goal: *goal,
             time: goal.time,
             handle_time: goal.time,
-            sample: DeviceSample { buttons: goal.buttons, ..*goal },
+            sample,
             reference: goal.orientation,
             queue: [DeviceCommand::zero(); MOST_DELAY + 1],
             heat: [0.0; 2],

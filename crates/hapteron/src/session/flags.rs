@@ -67,6 +67,12 @@ impl Flags {
         self.0 & other.0 == other.0
     }
 
+    /// Whether a fault keeps the force away.
+    #[must_use]
+    pub fn no_force(self) -> bool {
+        self.contains(Self::FAULT_LATCHED) || self.contains(Self::GUARD_FAULT)
+    }
+
     /// As they stand in `run.csv`.
     #[must_use]
     pub fn bits(self) -> u32 {
