@@ -102,7 +102,7 @@ pub fn jaws() -> SceneFile {
             ..Coupling::default()
         },
         contact: Contact { stiffness: Some(5e3), tolerance: Some(5e-4), ..Contact::default() },
-        device: Device { position_scale: Some(0.4) },
+        device: Device { position_scale: Some(0.4), ..Device::default() },
         hand: Hand { trajectory: Some("builtin:chewing".to_owned()), ..Hand::default() },
         ..SceneFile::default()
     }
