@@ -4,12 +4,15 @@
 //! that stands in for a person. What never lives here: meshes, the dynamics of the body, files. SI units, world axes.
 
 mod device;
+pub mod drivers;
 mod hand;
 mod scaling;
+mod undeliverable;
 
 pub use device::{Applied, Capabilities, Control, Device, DeviceFault, Pacing};
 pub use hand::{Hand, HandError, HandParameters};
 pub use scaling::{Scaling, ScalingError};
+pub use undeliverable::undeliverable;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
