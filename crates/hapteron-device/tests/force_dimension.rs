@@ -1,5 +1,7 @@
 //! The Force Dimension driver against a library with the same symbols.
 
+#![allow(clippy::unwrap_used, reason = "tests")]
+
 mod common;
 
 use common::{EmulatedLibrary, check_capabilities, resting_depth, run, wall_force};

@@ -1,7 +1,7 @@
 //! How a test scripts an emulated library: names and numbers through two further C symbols of it.
 #![allow(unsafe_code, reason = "C symbols for the test that loaded this library")]
 
-use crate::dhd;
+use crate::{dhd, hd};
 use std::ffi::{CStr, c_char};
 
 /// Sets a named value (`dhd.target_x`, `dhd.refuse_forces`, `hd.calibrated`, ...); 1 when the name is known.
@@ -14,6 +14,7 @@ pub unsafe extern "C" fn emulator_set(name: *const c_char, value: f64) -> i32 {
     let name = unsafe { CStr::from_ptr(name) }.to_str().unwrap_or("");
     let known = match name.split_once('.') {
         Some(("dhd", name)) => dhd::with(|d| d.set(name, value)),
+        Some(("hd", name)) => hd::with(|d| d.set(name, value)),
         _ => false,
     };
     i32::from(known)
@@ -29,6 +30,7 @@ pub unsafe extern "C" fn emulator_get(name: *const c_char) -> f64 {
     let name = unsafe { CStr::from_ptr(name) }.to_str().unwrap_or("");
     let value = match name.split_once('.') {
         Some(("dhd", name)) => dhd::with(|d| d.get(name)),
+        Some(("hd", name)) => hd::with(|d| d.get(name)),
         _ => None,
     };
     value.unwrap_or(f64::NAN)

@@ -9,5 +9,6 @@
 pub mod control;
 mod dhd;
 mod hand;
+mod hd;
 
 pub use hand::HandAndHandle;

@@ -11,6 +11,7 @@ mod options;
 mod survey;
 
 mod force_dimension;
+mod openhaptics;
 
 pub use error::{Looked, OpenError};
 pub use options::DriverOptions;
@@ -30,12 +31,20 @@ struct Driver {
 }
 
 /// All drivers, in the order in which they are shown.
-const DRIVERS: [Driver; 1] = [Driver {
-    kind: force_dimension::KIND,
-    devices: "Force Dimension delta, omega, sigma, lambda; Novint Falcon",
-    open: force_dimension::open,
-    attached: force_dimension::attached,
-}];
+const DRIVERS: [Driver; 2] = [
+    Driver {
+        kind: force_dimension::KIND,
+        devices: "Force Dimension delta, omega, sigma, lambda; Novint Falcon",
+        open: force_dimension::open,
+        attached: force_dimension::attached,
+    },
+    Driver {
+        kind: openhaptics::KIND,
+        devices: "3D Systems Touch, Touch X, Phantom (Sensable)",
+        open: openhaptics::open,
+        attached: openhaptics::attached,
+    },
+];
 
 /// The kinds that [`open`] knows.
 pub fn kinds() -> impl Iterator<Item = &'static str> {

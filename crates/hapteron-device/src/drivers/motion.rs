@@ -56,6 +56,16 @@ pub(super) fn vector_is_finite(v: &Vector3<f64>) -> bool {
     v.iter().all(|c| c.is_finite())
 }
 
+/// A force within a limit, direction kept, and the factor that it took.
+pub(super) fn limited(force: &Vector3<f64>, limit: f64) -> (Vector3<f64>, f64) {
+    let size = force.norm();
+    if size > limit {
+        let factor = limit / size;
+        return (force * factor, factor);
+    }
+    (*force, 1.0)
+}
+
 /// Number of samples remembered by [`Velocities`].
 const REMEMBERED: usize = 64;
 /// Seconds of motion that a linear velocity is taken over, where the device gives none.
