@@ -9,6 +9,8 @@
 pub mod control;
 mod dhd;
 mod hand;
+mod haply;
 mod hd;
 
 pub use hand::HandAndHandle;
+pub use haply::{Generation, HaplyService, HaplyState};

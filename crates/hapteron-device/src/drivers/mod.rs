@@ -11,6 +11,7 @@ mod options;
 mod survey;
 
 mod force_dimension;
+pub mod haply;
 mod openhaptics;
 
 pub use error::{Looked, OpenError};
@@ -31,7 +32,7 @@ struct Driver {
 }
 
 /// All drivers, in the order in which they are shown.
-const DRIVERS: [Driver; 2] = [
+const DRIVERS: [Driver; 3] = [
     Driver {
         kind: force_dimension::KIND,
         devices: "Force Dimension delta, omega, sigma, lambda; Novint Falcon",
@@ -43,6 +44,12 @@ const DRIVERS: [Driver; 2] = [
         devices: "3D Systems Touch, Touch X, Phantom (Sensable)",
         open: openhaptics::open,
         attached: openhaptics::attached,
+    },
+    Driver {
+        kind: haply::KIND,
+        devices: "Haply Inverse3, with or without VerseGrip",
+        open: haply::open,
+        attached: haply::attached,
     },
 ];
 
