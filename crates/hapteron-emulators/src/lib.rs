@@ -11,6 +11,10 @@ mod dhd;
 mod hand;
 mod haply;
 mod hd;
+#[cfg(unix)]
+mod spacenav;
 
 pub use hand::HandAndHandle;
 pub use haply::{Generation, HaplyService, HaplyState};
+#[cfg(unix)]
+pub use spacenav::Spacenavd;

@@ -13,6 +13,24 @@ mod survey;
 mod force_dimension;
 pub mod haply;
 mod openhaptics;
+#[cfg(unix)]
+pub mod spacemouse;
+#[cfg(not(unix))]
+mod spacemouse {
+    use super::{Device, DriverOptions, Found, OpenError};
+
+    pub(super) const KIND: &str = "spacemouse";
+    const NOT_HERE: OpenError =
+        OpenError::NotHere { kind: KIND, reason: "spacenavd runs on Linux and other Unix systems" };
+
+    pub(super) fn open(_: &DriverOptions) -> Result<Box<dyn Device>, OpenError> {
+        Err(NOT_HERE)
+    }
+
+    pub(super) fn attached() -> Result<Found, OpenError> {
+        Err(NOT_HERE)
+    }
+}
 
 pub use error::{Looked, OpenError};
 pub use options::DriverOptions;
@@ -32,7 +50,7 @@ struct Driver {
 }
 
 /// All drivers, in the order in which they are shown.
-const DRIVERS: [Driver; 3] = [
+const DRIVERS: [Driver; 4] = [
     Driver {
         kind: force_dimension::KIND,
         devices: "Force Dimension delta, omega, sigma, lambda; Novint Falcon",
@@ -50,6 +68,12 @@ const DRIVERS: [Driver; 3] = [
         devices: "Haply Inverse3, with or without VerseGrip",
         open: haply::open,
         attached: haply::attached,
+    },
+    Driver {
+        kind: spacemouse::KIND,
+        devices: "3Dconnexion SpaceMouse and relatives (input without force)",
+        open: spacemouse::open,
+        attached: spacemouse::attached,
     },
 ];
 
