@@ -13,8 +13,10 @@ mod haply;
 mod hd;
 #[cfg(unix)]
 mod spacenav;
+mod vrpn;
 
 pub use hand::HandAndHandle;
 pub use haply::{Generation, HaplyService, HaplyState};
 #[cfg(unix)]
 pub use spacenav::Spacenavd;
+pub use vrpn::{VrpnServer, VrpnState, vrpn_message, vrpn_pose};

@@ -32,6 +32,8 @@ mod spacemouse {
     }
 }
 
+pub mod vrpn;
+
 pub use error::{Looked, OpenError};
 pub use options::DriverOptions;
 pub use survey::{Attached, DriverSurvey, survey};
@@ -50,7 +52,7 @@ struct Driver {
 }
 
 /// All drivers, in the order in which they are shown.
-const DRIVERS: [Driver; 4] = [
+const DRIVERS: [Driver; 5] = [
     Driver {
         kind: force_dimension::KIND,
         devices: "Force Dimension delta, omega, sigma, lambda; Novint Falcon",
@@ -74,6 +76,12 @@ const DRIVERS: [Driver; 4] = [
         devices: "3Dconnexion SpaceMouse and relatives (input without force)",
         open: spacemouse::open,
         attached: spacemouse::attached,
+    },
+    Driver {
+        kind: vrpn::KIND,
+        devices: "any tracker of a VRPN server, and its force device",
+        open: vrpn::open,
+        attached: vrpn::attached,
     },
 ];
 
