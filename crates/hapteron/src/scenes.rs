@@ -102,10 +102,23 @@ pub fn jaws() -> SceneFile {
             ..Coupling::default()
         },
         contact: Contact { stiffness: Some(5e3), tolerance: Some(5e-4), ..Contact::default() },
-        device: Device { position_scale: Some(0.4) },
+        device: Device { position_scale: Some(0.4), ..Device::default() },
         hand: Hand { trajectory: Some("builtin:chewing".to_owned()), ..Hand::default() },
         ..SceneFile::default()
     }
+}
+
+/// The demonstration: the jaws of [`jaws`] held closed for 10 s by a hand that feels the force and yields to it.
+#[must_use]
+pub fn demo() -> SceneFile {
+    let hand = Hand {
+        trajectory: Some("builtin:holding".to_owned()),
+        // A light grip.
+        mass: Some(0.1),
+        damping: Some(6.0),
+        stiffness: Some(400.0),
+    };
+    SceneFile { scene: named("jaws held in a hand"), hand, ..jaws() }
 }
 
 fn named(name: &str) -> General {

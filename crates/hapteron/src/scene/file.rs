@@ -212,6 +212,10 @@ pub struct ContactThread {
 pub struct Device {
     /// Metres in the world for one metre of the device; default 1. Trajectories are in the world's scale.
     pub position_scale: Option<f64>,
+    /// Number of the button, from 0, each press of which lets go of the body or grasps it again; default 0.
+    pub grasp_button: Option<u32>,
+    /// Number of the button, from 0, while which is down the handle moves without the world; default 1.
+    pub clutch_button: Option<u32>,
 }
 
 /// `[hand]`

@@ -3,6 +3,7 @@
 use super::error::{SceneError, Source};
 use super::file::{self, Anticipation, Auto, SceneFile};
 use super::{ContactModel, ContactSettings, Model, PlacedObstacle, Scene};
+use crate::session::grasp::Buttons;
 use crate::trajectory::Trajectory;
 use crate::{assets, motion};
 use hapteron_collision::Surface;
@@ -35,6 +36,7 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
     let obstacles = resolver.obstacles(&mut file.obstacle)?;
     let scaling = file.device.position_scale.get_or_insert(1.0);
     let scaling = Scaling::new(*scaling).map_err(|e| source.fault("device.position_scale", e.to_string()))?;
+    let buttons = resolver.buttons(&mut file.device)?;
     let (trajectory, hand) = resolver.hand(&mut file.hand, time_step)?;
 
     let handle = trajectory.sample(0.0, time_step);
@@ -59,6 +61,7 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
         },
         time_step,
         scaling,
+        buttons,
         trajectory,
         hand,
         start,
@@ -197,6 +200,28 @@ impl Resolver<'_> {
         let rigid =
             RigidBody::new(mass, inertia).map_err(|e| self.source.fault("body.inertia", e.to_string()))?;
         Ok((rigid, center))
+    }
+
+    fn buttons(&self, device: &mut file::Device) -> Resolved<Buttons> {
+        let bit = |key: &str, number: &mut Option<u32>, default: u32| {
+            let n = *number.get_or_insert(default);
+            1u32.checked_shl(n).ok_or_else(|| {
+                self.source.fault(
+                    key,
+                    format!(
+                        "is {n}; buttons are counted from 0 to 31. One that the device lacks is never pressed"
+                    ),
+                )
+            })
+        };
+        let grasp = bit("device.grasp_button", &mut device.grasp_button, 0)?;
+        let clutch = bit("device.clutch_button", &mut device.clutch_button, 1)?;
+        if grasp == clutch {
+            return Err(self
+                .source
+                .fault("device.clutch_button", "is the same as grasp_button; give it another"));
+        }
+        Ok(Buttons { grasp, clutch })
     }
 
     fn hand(&self, hand: &mut file::Hand, dt: f64) -> Resolved<(Trajectory, Option<HandParameters>)> {

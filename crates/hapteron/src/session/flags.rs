@@ -14,8 +14,19 @@ impl Flags {
     /// No pass has delivered contacts yet.
     pub const NO_CONTACTS_YET: Self = Self(1 << 10);
 
+    /// The hand has let go of the body.
+    pub const RELEASED: Self = Self(1 << 11);
+    /// The handle moves and the world does not.
+    pub const CLUTCHED: Self = Self(1 << 12);
+    /// The body stands still by command.
+    pub const PAUSED: Self = Self(1 << 13);
+    /// The device gave no new sample; the last one was used again.
+    pub const SAMPLE_REPEATED: Self = Self(1 << 14);
+    /// Ticks before this one were missed.
+    pub const DEADLINE_MISSED: Self = Self(1 << 15);
+
     /// What the bits mean, for people.
-    const NAMES: [(u32, &'static str); 8] = [
+    const NAMES: [(u32, &'static str); 13] = [
         (Status::NON_FINITE.bits(), "a number was not finite"),
         (Status::SINGULAR.bits(), "the system of equations was singular"),
         (Status::COUPLING_ANGLE_LIMIT.bits(), "coupling near half a turn"),
@@ -24,6 +35,11 @@ impl Flags {
         (1 << 8, "more contacts than planes"),
         (1 << 9, "fault latched, no force"),
         (1 << 10, "no contacts known yet"),
+        (1 << 11, "body let go"),
+        (1 << 12, "clutch pressed"),
+        (1 << 13, "paused"),
+        (1 << 14, "device sample used again"),
+        (1 << 15, "ticks missed before this one"),
     ];
 
     /// From a step's status.
@@ -34,8 +50,14 @@ impl Flags {
 
     /// Both.
     #[must_use]
-    pub fn with(self, other: Self) -> Self {
+    pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
+    }
+
+    /// The bits that the other has as well.
+    #[must_use]
+    pub fn only(self, other: Self) -> Self {
+        Self(self.0 & other.0)
     }
 
     /// Whether all bits of the other are set.
