@@ -1,14 +1,16 @@
 //! What a haptic device is to the rest: it gives samples of its handle and takes commands.
 //!
-//! Here live the sample and the command, the scaling between the device's workspace and the virtual world, and the hand
-//! that stands in for a person. What never lives here: meshes, the dynamics of the body, files. SI units, world axes.
+//! Here live the sample and the command, the scaling between the device's workspace and the virtual world, the guard of the
+//! output, and simulated devices with the hand that stands in for a person. What never lives here: meshes, the dynamics of the body, files. SI units, world axes.
 
 mod device;
+pub mod guard;
 mod hand;
 mod scaling;
+pub mod simulated;
 
 pub use device::{Applied, Capabilities, Control, Device, DeviceFault, Pacing};
-pub use hand::{Hand, HandError, HandParameters};
+pub use hand::{GRIP_RADIUS, Grip, HandError, HandParameters, Tremor};
 pub use scaling::{Scaling, ScalingError};
 
 use nalgebra::{UnitQuaternion, Vector3};
