@@ -73,7 +73,7 @@ pub fn spoon_in_cup(mass: f64, stiffness: f64, method: Method) -> SceneFile {
             max_clusters: Some(8),
             ..Contact::default()
         },
-        contact_thread: ContactThread { period: Some(1e-3), latency: Some(0.0) },
+        contact_thread: ContactThread { period: Some(1e-3), latency: Some(0.0), ..ContactThread::default() },
         hand: Hand { trajectory: Some("builtin:spoon-in-cup".to_owned()), ..Hand::default() },
         ..spoon_in_free_space(mass, method)
     }

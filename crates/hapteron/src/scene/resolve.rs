@@ -4,6 +4,7 @@ use super::error::{SceneError, Source};
 use super::file::{self, Anticipation, Auto, SceneFile};
 use super::{ContactModel, ContactSettings, Model, PlacedObstacle, Scene};
 use crate::session::grasp::Buttons;
+use crate::session::real_time::HAPTIC_PRIORITY;
 use crate::trajectory::Trajectory;
 use crate::{assets, motion};
 use hapteron_collision::Surface;
@@ -346,6 +347,13 @@ impl Resolver<'_> {
             }
         };
         let thread = &mut file.contact_thread;
+        if let Some(priority) = thread.priority.filter(|p| !(1..HAPTIC_PRIORITY).contains(p)) {
+            let text = format!(
+                "is {priority}; it must be 1 to {}, below the haptic thread's. Leave it out for ordinary scheduling",
+                HAPTIC_PRIORITY - 1
+            );
+            return Err(self.source.fault("contact_thread.priority", text));
+        }
         Ok(ContactSettings {
             stiffness,
             damping,

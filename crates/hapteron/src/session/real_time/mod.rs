@@ -48,6 +48,8 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
+/// SCHED_FIFO priority that the haptic thread asks for: above the interrupts' threads (50), below the kernel's own watch (99).
+pub const HAPTIC_PRIORITY: i32 = 80;
 /// Ticks a second that the haptic thread can be asked for.
 pub const RATES: std::ops::RangeInclusive<f64> = 500.0..=8000.0;
 /// Time steps are compared with the rates to this share.
@@ -92,12 +94,11 @@ impl RealTimeOptions {
     /// The defaults for a scene.
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
-        let _ = scene;
         Self {
-            priority: Some(80),
+            priority: Some(HAPTIC_PRIORITY),
             cpu: None,
-            contact_priority: None,
-            contact_cpu: None,
+            contact_priority: scene.file.contact_thread.priority,
+            contact_cpu: scene.file.contact_thread.cpu,
             lock_memory: true,
             spin: clock::SPIN,
             duration: None,
