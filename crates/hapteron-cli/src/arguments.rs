@@ -33,6 +33,11 @@ pub enum Command {
     /// Two runs side by side: a table and a report
     #[command(after_help = "Example:\n  hapteron compare runs/a runs/b\n")]
     Compare(Compare),
+    /// This machine's figures: step and query times, and how late ticks come
+    #[command(
+        after_help = "Examples:\n  hapteron bench\n  hapteron bench --json --seconds 30 > bench.json\n  hapteron bench --soak 600\n"
+    )]
+    Bench(Bench),
     /// Write the built-in meshes and scenes into a folder, to start one's own from
     #[command(
         after_help = "Example:\n  hapteron models my-models\n  hapteron run my-models/spoon_in_cup.toml --virtual-time\n"
@@ -41,8 +46,9 @@ pub enum Command {
 }
 
 const RUN_EXAMPLES: &str = "Examples:
-  hapteron run scene.toml --virtual-time
+  hapteron run scene.toml
   hapteron run scene.toml --virtual-time --replay hand.csv --out result
+  hapteron run result/scene.toml --replay result/device.csv --set contact.stiffness=2000 --out other
   hapteron run scene.toml --virtual-time --set coupling.linear_stiffness=500 --set integrator.method=runge-kutta-4
 ";
 
@@ -57,6 +63,12 @@ pub struct Demo {
     /// Folder for the results [default: runs/demo, numbered when it exists]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Seconds [default: 10]
+    #[arg(long, value_name = "S")]
+    pub duration: Option<f64>,
+    /// Run on the deterministic schedule, as fast as the machine can
+    #[arg(long)]
+    pub virtual_time: bool,
 }
 
 /// `hapteron run`
@@ -65,10 +77,14 @@ pub struct Run {
     /// The scene (TOML)
     #[arg(value_name = "SCENE.toml")]
     pub scene: PathBuf,
-    /// Run on the deterministic schedule, as fast as the machine can (the only way until real devices are supported)
+    /// Run on the deterministic schedule, as fast as the machine can, instead of in real time
     #[arg(long)]
     pub virtual_time: bool,
-    /// Let the handle follow this motion exactly (t,px,py,pz,qw,qx,qy,qz) instead of the scene's hand
+    /// End after so many seconds [default: with the scene's motion]
+    #[arg(long, value_name = "S")]
+    pub duration: Option<f64>,
+    /// Let the handle follow this motion exactly (t,px,py,pz,qw,qx,qy,qz) instead of the scene's hand; or make a session again from its device.csv
+    /// (in virtual time; the same bits, or what they would have been under --set)
     #[arg(long, value_name = "T.csv")]
     pub replay: Option<PathBuf>,
     /// Override a key of the scene, as in contact.stiffness=2000; may be repeated
@@ -128,6 +144,20 @@ pub struct Compare {
     /// Folder for the report [default: runs/compare, numbered when it exists]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// `hapteron bench`
+#[derive(Args, Debug)]
+pub struct Bench {
+    /// As JSON
+    #[arg(long)]
+    pub json: bool,
+    /// How long each of the two loops runs
+    #[arg(long, default_value_t = 10.0, value_name = "N")]
+    pub seconds: f64,
+    /// Instead: a session for so many seconds, and whether it leaks memory or drifts
+    #[arg(long, value_name = "SECONDS")]
+    pub soak: Option<f64>,
 }
 
 /// `hapteron models`

@@ -1,9 +1,11 @@
 //! The commands, one file each.
 
+pub mod bench;
 pub mod compare;
 pub mod demo;
 pub mod mesh;
 pub mod models;
 pub mod query;
+mod real_time;
 pub mod reproduce;
 pub mod run;

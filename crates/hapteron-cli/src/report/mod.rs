@@ -5,10 +5,12 @@ mod picture;
 mod plot;
 mod reproduction;
 mod run;
+mod timing;
 
 pub use compare::{Compared, comparison};
 pub use reproduction::reproduction;
-pub use run::run;
+pub use run::{Live, Outcome, Time, run};
+pub use timing::{distribution_json, json as timing_json};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

@@ -205,8 +205,14 @@ pub enum Method {
 pub struct ContactThread {
     /// From the start of one pass to the start of the next, seconds; default the time step.
     pub period: Option<f64>,
-    /// From the start of a pass until its contacts can be used, seconds; default the time step.
+    /// From the start of a pass until its contacts can be used, seconds; default the time step. In real time it is what it is.
     pub latency: Option<f64>,
+    /// Real time: number of the CPU that it is to stay on; default any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cpu: Option<usize>,
+    /// Real time: 1 to 79 for SCHED_FIFO, below the haptic thread's 80; default ordinary scheduling.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub priority: Option<i32>,
 }
 
 /// `[device]`
@@ -233,6 +239,10 @@ pub struct Device {
     pub resolution: Option<f64>,
     /// Metres in the world for one metre of the device; default 1. Trajectories are in the world's scale.
     pub position_scale: Option<f64>,
+    /// Number of the button, from 0, each press of which lets go of the body or grasps it again; default 0.
+    pub grasp_button: Option<u32>,
+    /// Number of the button, from 0, while which is down the handle moves without the world; default 1.
+    pub clutch_button: Option<u32>,
 }
 
 /// `[hand]`

@@ -13,6 +13,7 @@ mod resolve;
 pub use error::SceneError;
 pub use file::{ContactModel, SceneFile};
 
+use crate::session::grasp::Buttons;
 use crate::trajectory::Trajectory;
 use error::Source;
 use hapteron_collision::Surface;
@@ -90,6 +91,8 @@ pub struct Scene {
     pub time_step: f64,
     /// Between device and world.
     pub scaling: Scaling,
+    /// Those of the device that grasp and clutch.
+    pub buttons: Buttons,
     /// The motion of the handle (or of the hand's goal), in the world's scale.
     pub trajectory: Trajectory,
     /// A simulated hand; without, the handle follows the trajectory exactly.

@@ -3,6 +3,8 @@
 use super::error::{SceneError, Source};
 use super::file::{self, Anticipation, Auto, SceneFile};
 use super::{ContactModel, ContactSettings, Model, PlacedObstacle, Scene};
+use crate::session::grasp::Buttons;
+use crate::session::real_time::HAPTIC_PRIORITY;
 use crate::trajectory::Trajectory;
 use crate::{assets, motion};
 use hapteron_collision::Surface;
@@ -35,6 +37,7 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
     let obstacles = resolver.obstacles(&mut file.obstacle)?;
     let scaling = file.device.position_scale.get_or_insert(1.0);
     let scaling = Scaling::new(*scaling).map_err(|e| source.fault("device.position_scale", e.to_string()))?;
+    let buttons = resolver.buttons(&mut file.device)?;
     let trajectory = resolver.trajectory(&mut file.hand, time_step)?;
     let closed = resolver.closed_loop(&mut file, time_step)?;
 
@@ -60,6 +63,7 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
         },
         time_step,
         scaling,
+        buttons,
         trajectory,
         hand: closed.hand,
         simulated: closed.simulated,
@@ -202,6 +206,28 @@ impl Resolver<'_> {
         Ok((rigid, center))
     }
 
+    fn buttons(&self, device: &mut file::Device) -> Resolved<Buttons> {
+        let bit = |key: &str, number: &mut Option<u32>, default: u32| {
+            let n = *number.get_or_insert(default);
+            1u32.checked_shl(n).ok_or_else(|| {
+                self.source.fault(
+                    key,
+                    format!(
+                        "is {n}; buttons are counted from 0 to 31. One that the device lacks is never pressed"
+                    ),
+                )
+            })
+        };
+        let grasp = bit("device.grasp_button", &mut device.grasp_button, 0)?;
+        let clutch = bit("device.clutch_button", &mut device.clutch_button, 1)?;
+        if grasp == clutch {
+            return Err(self
+                .source
+                .fault("device.clutch_button", "is the same as grasp_button; give it another"));
+        }
+        Ok(Buttons { grasp, clutch })
+    }
+
     fn trajectory(&self, hand: &mut file::Hand, dt: f64) -> Resolved<Trajectory> {
         let Some(name) = &mut hand.trajectory else {
             let text = "is missing: in virtual time the handle needs a motion. Give a CSV file (t,px,py,pz,qw,qx,qy,qz), `builtin:NAME`, or --replay FILE";
@@ -321,6 +347,13 @@ impl Resolver<'_> {
             }
         };
         let thread = &mut file.contact_thread;
+        if let Some(priority) = thread.priority.filter(|p| !(1..HAPTIC_PRIORITY).contains(p)) {
+            let text = format!(
+                "is {priority}; it must be 1 to {}, below the haptic thread's. Leave it out for ordinary scheduling",
+                HAPTIC_PRIORITY - 1
+            );
+            return Err(self.source.fault("contact_thread.priority", text));
+        }
         Ok(ContactSettings {
             stiffness,
             damping,

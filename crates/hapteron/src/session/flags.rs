@@ -15,11 +15,22 @@ impl Flags {
     /// No pass has delivered contacts yet.
     pub const NO_CONTACTS_YET: Self = Self(1 << 10);
 
+    /// The hand has let go of the body.
+    pub const RELEASED: Self = Self(1 << 11);
+    /// The handle moves and the world does not.
+    pub const CLUTCHED: Self = Self(1 << 12);
+    /// The body stands still by command.
+    pub const PAUSED: Self = Self(1 << 13);
+    /// The device gave no new sample; the last one was used again.
+    pub const SAMPLE_REPEATED: Self = Self(1 << 14);
+    /// Ticks before this one were missed.
+    pub const DEADLINE_MISSED: Self = Self(1 << 15);
+
     /// The guard latched a fault: the command is zero until it is re-armed.
     pub const GUARD_FAULT: Self = Self::from_guard(GuardStatus::FAULT);
 
     /// What the bits mean, for people.
-    const NAMES: [(u32, &'static str); 21] = [
+    const NAMES: [(u32, &'static str); 26] = [
         (Status::NON_FINITE.bits(), "a number was not finite"),
         (Status::SINGULAR.bits(), "the system of equations was singular"),
         (Status::COUPLING_ANGLE_LIMIT.bits(), "coupling near half a turn"),
@@ -28,6 +39,11 @@ impl Flags {
         (1 << 8, "more contacts than planes"),
         (1 << 9, "fault latched, no force"),
         (1 << 10, "no contacts known yet"),
+        (1 << 11, "body let go"),
+        (1 << 12, "clutch pressed"),
+        (1 << 13, "paused"),
+        (1 << 14, "device sample used again"),
+        (1 << 15, "ticks missed before this one"),
         (Self::from_guard(GuardStatus::LIMITED).0, "guard: force or torque at its limit"),
         (Self::from_guard(GuardStatus::SLEWED).0, "guard: force changes too fast"),
         (Self::from_guard(GuardStatus::POWER_LIMITED).0, "guard: power at its limit"),
@@ -57,8 +73,14 @@ impl Flags {
 
     /// Both.
     #[must_use]
-    pub fn with(self, other: Self) -> Self {
+    pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
+    }
+
+    /// The bits that the other has as well.
+    #[must_use]
+    pub fn only(self, other: Self) -> Self {
+        Self(self.0 & other.0)
     }
 
     /// Whether all bits of the other are set.

@@ -8,13 +8,13 @@
 //!
 //! With a simulated hand the loop is closed: tick i's command pushes the simulated device from t_i + delay dt on, by default one sample late.
 
+use super::contact_pass::sample_speed;
 use super::{ContactPass, ContactSnapshot, HapticState, Settings, Tick, tick};
 use crate::recording::{Recording, Row};
 use crate::scene::{Scene, SceneError};
 use hapteron_device::guard::Guard;
 use hapteron_device::simulated::SimulatedDevice;
 use hapteron_device::{Device, DeviceSample};
-use nalgebra::Vector3;
 
 /// Times closer than this are equal, seconds.
 const SAME_TIME: f64 = 1e-9;
@@ -54,7 +54,7 @@ impl<'a> VirtualTime<'a> {
         let guard = scene.guard.map(Guard::new).transpose().map_err(|e| fault(scene, e.to_string()))?;
         let mut pass = ContactPass::new(scene);
         let mut current = ContactSnapshot::empty(&scene.body, &scene.start);
-        pass.run(scene, &scene.start, speed_of_handle(scene, &sample), 0.0, &mut current);
+        pass.run(scene, &scene.start, sample_speed(scene, &sample), 0.0, &mut current);
         Ok(Self {
             scene,
             settings: Settings::of(scene),
@@ -136,7 +136,7 @@ impl<'a> VirtualTime<'a> {
                 return;
             }
             let stamp = self.newest_time(start_before);
-            let speed = speed_of_handle(self.scene, &self.sample);
+            let speed = sample_speed(self.scene, &self.sample);
             self.pass.run(self.scene, &self.haptic.state, speed, stamp, &mut self.pending);
             self.fresh = true;
             let ready = self.next_start + self.scene.contact.latency;
@@ -157,7 +157,10 @@ fn fault(scene: &Scene, problem: String) -> SceneError {
 }
 
 /// The scene's device in the scene's hand, switched on.
-fn simulated_device(scene: &Scene, start: &DeviceSample) -> Result<Option<SimulatedDevice>, SceneError> {
+pub(super) fn simulated_device(
+    scene: &Scene,
+    start: &DeviceSample,
+) -> Result<Option<SimulatedDevice>, SceneError> {
     if scene.hand.is_none() {
         return Ok(None);
     }
@@ -171,13 +174,6 @@ fn in_device_scale(scene: &Scene, sample: &DeviceSample) -> DeviceSample {
     scene.scaling.from_world(sample)
 }
 
-/// Speed of the fastest point that would move with the handle, in the world, m/s.
-fn speed_of_handle(scene: &Scene, sample: &DeviceSample) -> f64 {
-    let sample = scene.scaling.to_world(sample);
-    let norm = |v: Vector3<f64>| libm::sqrt(v.norm_squared());
-    norm(sample.linear_velocity) + norm(sample.angular_velocity) * scene.model.surface.radius()
-}
-
 /// Runs a scene from its start to the end of its motion.
 ///
 /// The same scene gives the same bits, on every run and in every build. `progress` is told the share that is done (0 to 1), about a
@@ -186,8 +182,20 @@ fn speed_of_handle(scene: &Scene, sample: &DeviceSample) -> f64 {
 /// # Errors
 /// As [`VirtualTime::new`].
 pub fn run_virtual(scene: &Scene, progress: Progress<'_>) -> Result<Recording, SceneError> {
+    run_virtual_for(scene, scene.duration(), progress)
+}
+
+/// As [`run_virtual`], for so many seconds; after its end the motion stands still.
+///
+/// # Errors
+/// As [`VirtualTime::new`].
+pub fn run_virtual_for(
+    scene: &Scene,
+    duration: f64,
+    progress: Progress<'_>,
+) -> Result<Recording, SceneError> {
     let mut session = VirtualTime::new(scene)?;
-    let ticks = (scene.duration() / scene.time_step + SAME_TIME / scene.time_step).floor() as u64;
+    let ticks = (duration / scene.time_step + SAME_TIME / scene.time_step).floor() as u64;
     let mut recording = Recording::new();
     recording.rows.reserve(ticks.min(10_000_000) as usize);
     let report_every = (ticks / 100).max(1);
