@@ -24,5 +24,5 @@ pub fn demo(arguments: &Demo) -> Result<ExitCode> {
     if arguments.virtual_time {
         return run_into(&scene, duration, &folder);
     }
-    real_time::run_into(scene, &Plan { duration, bare: true, repeat: true }, &folder)
+    real_time::run_into(scene, &Plan { duration, bare: true, repeat: true, recorded_motion: false }, &folder)
 }

@@ -4,7 +4,7 @@ use super::run::{begin, finish};
 use crate::progress;
 use crate::report::{self, Live, Outcome, Time};
 use anyhow::{Context, Result, bail};
-use hapteron::device::Device;
+use hapteron::device::{Device, drivers};
 use hapteron::scene::Scene;
 use hapteron::session::real_time::{
     Finished, PassRecord, RealTime, RealTimeOptions, Recorded, Recorder, Running, SceneDevice, TickRecord,
@@ -18,12 +18,14 @@ use std::time::{Duration, Instant};
 
 /// How a run is made.
 pub struct Plan {
-    /// Seconds; none: as long as the scene's motion.
+    /// Seconds; none: as long as the scene's motion, or until Ctrl-C with a real device.
     pub duration: Option<f64>,
     /// Measure a bare loop besides.
     pub bare: bool,
     /// The motion begins anew at its end.
     pub repeat: bool,
+    /// The handle follows the scene's motion, whatever device the scene names.
+    pub recorded_motion: bool,
 }
 
 /// Between two looks at the session.
@@ -32,27 +34,36 @@ const LOOK: Duration = Duration::from_millis(20);
 const LINE: Duration = Duration::from_millis(500);
 
 /// Runs a scene in real time and writes the run folder; fails when the run was not stable or ended early.
-pub fn run_into(scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode> {
-    let scene = Arc::new(scene);
+pub fn run_into(mut scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode> {
     let notes = begin(&scene, folder)?;
     progress::catch_interrupt();
-    let device = SceneDevice::new(Arc::clone(&scene), plan.repeat)?;
-    let name = device.capabilities().name.clone();
-    let duration = plan.duration.unwrap_or_else(|| scene.duration());
-    let options = RealTimeOptions {
-        duration: Some(duration),
-        bare: plan.bare,
-        attach: false,
-        ..RealTimeOptions::of(&scene)
+    let driver = scene.driver().filter(|_| !plan.recorded_motion);
+    let real = match driver {
+        Some((kind, options)) => Some(drivers::open(kind, &options)?),
+        None => None,
     };
-    let running = RealTime::start(Arc::clone(&scene), Box::new(device), options)?;
+    if let Some(device) = &real {
+        scene.adopt(device.capabilities())?;
+    }
+    let scene = Arc::new(scene);
+    // A real device is held as long as its user likes; a motion has an end.
+    let duration = plan.duration.or_else(|| real.is_none().then(|| scene.duration()));
+    let attach = real.is_some();
+    let device: Box<dyn Device> = match real {
+        Some(device) => device,
+        None => Box::new(SceneDevice::new(Arc::clone(&scene), plan.repeat)?),
+    };
+    let name = device.capabilities().name.clone();
+    let options = RealTimeOptions { duration, bare: plan.bare, attach, ..RealTimeOptions::of(&scene) };
+    let running = RealTime::start(Arc::clone(&scene), device, options)?;
     eprintln!("haptic thread: {}; memory {}", running.grants().priority, running.grants().memory);
     let (finished, recorded) = follow(running, Arc::clone(&scene))?;
     let Recorded { mut recording, log, timing } = recorded;
     if recording.rows.is_empty() {
         bail!("the session ended before its first tick: {}", finished.end);
     }
-    recording.cancelled = progress::interrupted();
+    // Without a duration Ctrl-C is the way to end it.
+    recording.cancelled = progress::interrupted() && duration.is_some();
     let path = folder.join("device.csv");
     let file = std::fs::File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
     log.write_csv(file).with_context(|| format!("cannot write {}", path.display()))?;
@@ -67,7 +78,7 @@ pub fn run_into(scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode> {
     let text = serde_json::to_string_pretty(&report::timing_json(&live))?;
     std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     let outcome = Outcome { scene: &scene, recording: &recording, time: Time::Real(Box::new(live)) };
-    let code = finish(&outcome, duration, &notes, folder)?;
+    let code = finish(&outcome, duration.unwrap_or_default(), &notes, folder)?;
     if !finished.end.is_regular() {
         bail!("the session ended early: {}", finished.end);
     }

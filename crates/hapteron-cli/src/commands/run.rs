@@ -31,10 +31,16 @@ pub fn run(arguments: &Run) -> Result<ExitCode> {
     if let Some(path) = log {
         return replay_into(&scene, path, &folder);
     }
+    if arguments.virtual_time && scene.file.hand.trajectory.is_none() {
+        bail!(
+            "in virtual time there is no real device; the scene needs [hand] trajectory, or give --replay FILE"
+        );
+    }
     if arguments.virtual_time {
         return run_into(&scene, duration, &folder);
     }
-    let plan = Plan { duration, bare: false, repeat: false };
+    let recorded_motion = arguments.replay.is_some();
+    let plan = Plan { duration, bare: false, repeat: false, recorded_motion };
     real_time::run_into(scene, &plan, &folder)
 }
 

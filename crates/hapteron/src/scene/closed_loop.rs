@@ -10,7 +10,7 @@ use hapteron_device::{Capabilities, DeviceSample, Grip, HandParameters};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// The kind of device that is no driver.
-const SIMULATED: &str = "simulated";
+pub(super) const SIMULATED: &str = "simulated";
 
 /// What the three tables come to.
 pub(super) struct ClosedLoop {
@@ -138,17 +138,22 @@ impl Resolver<'_> {
         Guard::new(settings).map_err(|e| self.source.fault(&format!("guard.{}", e.0), e.to_string()))?;
         if !real {
             // Of a real device only the device itself knows the limits.
-            keys.max_force = Some(settings.max_force);
-            keys.max_torque = Some(settings.max_torque);
-            keys.max_slew = Some(settings.max_slew);
-            keys.max_power = Some(settings.max_power);
-            keys.ramp_time = Some(settings.ramp_time);
-            keys.stale_after = Some(settings.stale_after);
-            keys.max_speed = Some(settings.max_speed);
-            keys.passivity = Some(settings.passivity);
+            write_out(keys, &settings);
         }
         Ok(enabled.then_some(settings))
     }
+}
+
+/// Writes the limits into the scene's keys.
+pub(super) fn write_out(keys: &mut file::Guard, settings: &GuardSettings) {
+    keys.max_force = Some(settings.max_force);
+    keys.max_torque = Some(settings.max_torque);
+    keys.max_slew = Some(settings.max_slew);
+    keys.max_power = Some(settings.max_power);
+    keys.ramp_time = Some(settings.ramp_time);
+    keys.stale_after = Some(settings.stale_after);
+    keys.max_speed = Some(settings.max_speed);
+    keys.passivity = Some(settings.passivity);
 }
 
 /// The limits for a device: the scene's where it has them, else the device's.

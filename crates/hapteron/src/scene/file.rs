@@ -4,6 +4,7 @@
 //! again with nothing left out.
 
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A scene file.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -243,6 +244,9 @@ pub struct Device {
     pub grasp_button: Option<u32>,
     /// Number of the button, from 0, while which is down the handle moves without the world; default 1.
     pub clutch_button: Option<u32>,
+    /// Of a driver: what it needs to find its device; see `docs/devices.md`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub options: BTreeMap<String, toml::Value>,
 }
 
 /// `[hand]`

@@ -18,6 +18,7 @@ use crate::trajectory::Trajectory;
 use error::Source;
 use hapteron_collision::Surface;
 use hapteron_collision::mesh::TriMesh;
+use hapteron_device::drivers::DriverOptions;
 use hapteron_device::guard::{Guard, GuardSettings};
 use hapteron_device::simulated::SimulatedSettings;
 use hapteron_device::{Capabilities, DeviceSample, HandParameters, Scaling};
@@ -192,6 +193,31 @@ impl Scene {
         Guard::new(closed_loop::guard_settings(&self.file.guard, device, self.time_step))
             .map(Some)
             .map_err(fault)
+    }
+
+    /// Takes the limits of a device that is open into the scene, for its guard and for [`Scene::to_toml`].
+    ///
+    /// # Errors
+    /// As [`Scene::guard_for`].
+    pub fn adopt(&mut self, device: &Capabilities) -> Result<(), SceneError> {
+        self.guard = self.guard_for(device)?.map(|guard| *guard.settings());
+        if let Some(settings) = &self.guard {
+            closed_loop::write_out(&mut self.file.guard, settings);
+        }
+        Ok(())
+    }
+
+    /// The driver and its options; none where the device is simulated.
+    #[must_use]
+    pub fn driver(&self) -> Option<(&str, DriverOptions)> {
+        let kind = self.file.device.kind.as_deref().filter(|kind| *kind != closed_loop::SIMULATED)?;
+        let mut options = DriverOptions::new();
+        for (key, value) in &self.file.device.options {
+            // A text without its quotes.
+            let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+            options.set(key.clone(), text);
+        }
+        Some((kind, options))
     }
 
     /// The pose of the body's mesh frame at a state.

@@ -1,11 +1,12 @@
 //! Fills in what a scene leaves out and checks what it says.
 
+use super::closed_loop;
 use super::error::{SceneError, Source};
 use super::file::{self, Anticipation, Auto, SceneFile};
 use super::{ContactModel, ContactSettings, Model, PlacedObstacle, Scene};
 use crate::session::grasp::Buttons;
 use crate::session::real_time::HAPTIC_PRIORITY;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{PoseRow, Trajectory};
 use crate::{assets, motion};
 use hapteron_collision::Surface;
 use hapteron_collision::mesh::{self, TriMesh};
@@ -38,7 +39,7 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
     let scaling = file.device.position_scale.get_or_insert(1.0);
     let scaling = Scaling::new(*scaling).map_err(|e| source.fault("device.position_scale", e.to_string()))?;
     let buttons = resolver.buttons(&mut file.device)?;
-    let trajectory = resolver.trajectory(&mut file.hand, time_step)?;
+    let trajectory = resolver.trajectory(&mut file, center_of_mass, time_step)?;
     let closed = resolver.closed_loop(&mut file, time_step)?;
 
     let handle = closed.sensed(trajectory.sample(0.0, time_step));
@@ -228,9 +229,13 @@ impl Resolver<'_> {
         Ok(Buttons { grasp, clutch })
     }
 
-    fn trajectory(&self, hand: &mut file::Hand, dt: f64) -> Resolved<Trajectory> {
-        let Some(name) = &mut hand.trajectory else {
-            let text = "is missing: in virtual time the handle needs a motion. Give a CSV file (t,px,py,pz,qw,qx,qy,qz), `builtin:NAME`, or --replay FILE";
+    fn trajectory(&self, file: &mut SceneFile, center: Vector3<f64>, dt: f64) -> Resolved<Trajectory> {
+        let driven = file.device.kind.as_ref().is_some_and(|kind| kind != closed_loop::SIMULATED);
+        let Some(name) = &mut file.hand.trajectory else {
+            if driven {
+                return self.waiting_handle(file, center);
+            }
+            let text = "is missing: without a real device the handle needs a motion. Give a CSV file (t,px,py,pz,qw,qx,qy,qz), `builtin:NAME`, or --replay FILE";
             return Err(self.source.fault("hand.trajectory", text));
         };
         let fault =
@@ -242,6 +247,20 @@ impl Resolver<'_> {
             *name = path.clone();
             Trajectory::load(path).map_err(fault)
         }
+    }
+
+    /// Where a real device's handle is taken to be until it tells: at the centre of mass of the body, or at the origin.
+    fn waiting_handle(&self, file: &mut SceneFile, center: Vector3<f64>) -> Resolved<Trajectory> {
+        let pose = match (file.body.position, &mut file.body.orientation) {
+            (Some(p), Some(q)) => {
+                let rotation = self.rotation("body.orientation", q)?;
+                Isometry3::from_parts((self.vector("body.position", p)? + rotation * center).into(), rotation)
+            }
+            _ => Isometry3::identity(),
+        };
+        let still = |time| PoseRow { time, pose, velocity: Some([Vector3::zeros(); 2]) };
+        Trajectory::from_rows(vec![still(0.0), still(1.0)], "waiting handle")
+            .map_err(|e| self.source.fault("hand.trajectory", e.to_string()))
     }
 
     /// The grasp is given, or recorded from where handle and body are at the start (section 5.1 of the paper).

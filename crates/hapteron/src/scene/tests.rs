@@ -133,3 +133,20 @@ fn a_hand_gets_a_guard_with_its_device_s_limits() {
     let real = parse(&with("device/kind = \"forcedimension\"")).unwrap();
     assert_eq!(real.guard_for(&device).unwrap().unwrap().settings().max_force, 12.0);
 }
+
+/// Would catch buttons or a priority that cannot be, and a priority above the haptic thread's.
+#[test]
+fn buttons_and_priorities_are_checked() {
+    assert!(fault("device/grasp_button = 32").contains("0 to 31"));
+    assert!(fault("device/clutch_button = 0").contains("the same as grasp_button"));
+    assert!(fault("contact_thread/priority = 80").contains("1 to 79"));
+    let scene = parse(&with("device/grasp_button = 3")).unwrap();
+    assert_eq!((scene.buttons.grasp, scene.buttons.clutch), (8, 2));
+    let driven = SCENE.replace("trajectory = \"builtin:free-space\"", "") + "[device]\nkind = \"haply\"\n";
+    let options = driven.clone() + "[device.options]\naddress = \"a:1\"\npatience = 0.5\n";
+    let scene = parse(&options).unwrap();
+    let (kind, options) = scene.driver().unwrap();
+    assert_eq!((kind, options.get("address"), options.get("patience")), ("haply", Some("a:1"), Some("0.5")));
+    assert_eq!(parse(&scene.to_toml().unwrap()).unwrap().file, scene.file);
+    assert!(parse(&driven.replace("haply", "simulated")).unwrap_err().to_string().contains("needs a motion"));
+}

@@ -66,8 +66,9 @@ impl Loop {
             None => return End::HapticFrozen,
         };
         match pacing {
-            Pacing::Polled => self.polled(device),
-            Pacing::Exchange => self.exchanged(device),
+            // A device that answers each write with a sample has it ready by the next deadline; faster ticks than the simulation's would make
+            // the body's time go faster.
+            Pacing::Polled | Pacing::Exchange => self.polled(device),
             Pacing::Callback => self.served(device),
         }
     }
@@ -106,27 +107,6 @@ impl Loop {
         let instant = Instant { time, started_ns, lateness_ns, missed };
         let command = self.round(&sample, &instant);
         self.write(device, &command)
-    }
-
-    /// By the device's answers.
-    fn exchanged(&mut self, device: &SharedDevice) -> End {
-        loop {
-            if let Some(end) = self.wanted_end() {
-                return end;
-            }
-            let sample = match self.sample(device) {
-                Ok(sample) => sample,
-                Err(end) => return end,
-            };
-            let instant = self.instant();
-            if self.is_over(instant.time) {
-                return End::Elapsed;
-            }
-            let command = self.round(&sample, &instant);
-            if let Err(end) = self.write(device, &command) {
-                return end;
-            }
-        }
     }
 
     /// By the device's own thread.
