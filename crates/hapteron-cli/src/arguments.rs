@@ -33,6 +33,9 @@ pub enum Command {
     /// Two runs side by side: a table and a report
     #[command(after_help = "Example:\n  hapteron compare runs/a runs/b\n")]
     Compare(Compare),
+    /// Supported and attached devices, and what is missing for the others
+    #[command(after_help = "Examples:\n  hapteron devices\n  hapteron devices --json\n")]
+    Devices(Devices),
     /// Write the built-in meshes and scenes into a folder, to start one's own from
     #[command(
         after_help = "Example:\n  hapteron models my-models\n  hapteron run my-models/spoon_in_cup.toml --virtual-time\n"
@@ -128,6 +131,14 @@ pub struct Compare {
     /// Folder for the report [default: runs/compare, numbered when it exists]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// `hapteron devices`
+#[derive(Args, Debug)]
+pub struct Devices {
+    /// The same as JSON (SI units; null is a limit that is not known)
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `hapteron models`
