@@ -38,6 +38,9 @@ pub enum Command {
         after_help = "Examples:\n  hapteron bench\n  hapteron bench --json --seconds 30 > bench.json\n  hapteron bench --soak 600\n"
     )]
     Bench(Bench),
+    /// Supported and attached devices, and what is missing for the others
+    #[command(after_help = "Examples:\n  hapteron devices\n  hapteron devices --json\n")]
+    Devices(Devices),
     /// Write the built-in meshes and scenes into a folder, to start one's own from
     #[command(
         after_help = "Example:\n  hapteron models my-models\n  hapteron run my-models/spoon_in_cup.toml --virtual-time\n"
@@ -158,6 +161,14 @@ pub struct Bench {
     /// Instead: a session for so many seconds, and whether it leaks memory or drifts
     #[arg(long, value_name = "SECONDS")]
     pub soak: Option<f64>,
+}
+
+/// `hapteron devices`
+#[derive(Args, Debug)]
+pub struct Devices {
+    /// The same as JSON (SI units; null is a limit that is not known)
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `hapteron models`

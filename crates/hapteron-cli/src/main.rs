@@ -23,6 +23,7 @@ fn main() -> ExitCode {
         Command::Mesh(a) => commands::mesh::mesh(&a),
         Command::Compare(a) => commands::compare::compare(&a),
         Command::Bench(a) => commands::bench::bench(&a),
+        Command::Devices(a) => commands::devices::devices(&a),
         Command::Models(a) => commands::models::models(&a),
     };
     match outcome {
