@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         Command::Query(a) => commands::query::query(&a),
         Command::Mesh(a) => commands::mesh::mesh(&a),
         Command::Compare(a) => commands::compare::compare(&a),
+        Command::Stability(a) => commands::stability::stability(&a),
         Command::Models(a) => commands::models::models(&a),
     };
     match outcome {

@@ -7,3 +7,4 @@ pub mod models;
 pub mod query;
 pub mod reproduce;
 pub mod run;
+pub mod stability;

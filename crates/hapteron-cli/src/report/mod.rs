@@ -5,10 +5,12 @@ mod picture;
 mod plot;
 mod reproduction;
 mod run;
+mod stability;
 
 pub use compare::{Compared, comparison};
 pub use reproduction::reproduction;
 pub use run::run;
+pub use stability::stability;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

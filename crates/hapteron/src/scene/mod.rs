@@ -186,9 +186,14 @@ impl Scene {
         if self.file.guard.enabled == Some(false) {
             return Ok(None);
         }
-        Guard::new(closed_loop::guard_settings(&self.file.guard, device, self.time_step))
-            .map(Some)
-            .map_err(fault)
+        Guard::new(closed_loop::guard_settings(
+            &self.file.guard,
+            device,
+            self.simulated.delay,
+            self.time_step,
+        ))
+        .map(Some)
+        .map_err(fault)
     }
 
     /// The pose of the body's mesh frame at a state.
