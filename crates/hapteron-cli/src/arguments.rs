@@ -41,6 +41,9 @@ pub enum Command {
     /// Supported and attached devices, and what is missing for the others
     #[command(after_help = "Examples:\n  hapteron devices\n  hapteron devices --json\n")]
     Devices(Devices),
+    /// Where in the plane of two scene keys a simulated hand can hold the object: a map
+    #[command(after_help = STABILITY_EXAMPLES)]
+    Stability(Stability),
     /// Write the built-in meshes and scenes into a folder, to start one's own from
     #[command(
         after_help = "Example:\n  hapteron models my-models\n  hapteron run my-models/spoon_in_cup.toml --virtual-time\n"
@@ -53,6 +56,11 @@ const RUN_EXAMPLES: &str = "Examples:
   hapteron run scene.toml --virtual-time --replay hand.csv --out result
   hapteron run result/scene.toml --replay result/device.csv --set contact.stiffness=2000 --out other
   hapteron run scene.toml --virtual-time --set coupling.linear_stiffness=500 --set integrator.method=runge-kutta-4
+";
+
+const STABILITY_EXAMPLES: &str = "Examples:
+  hapteron stability scene.toml --x body.mass=0.001:0.1:7 --y coupling.linear_stiffness=100:5000:8
+  hapteron stability scene.toml --x hand.grip=released,light,medium,firm --y contact.stiffness=2000:10000:5 --set device.delay=2
 ";
 
 const QUERY_EXAMPLES: &str = "Examples:
@@ -94,6 +102,26 @@ pub struct Run {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
     /// Folder for the results [default: runs/NAME, numbered when it exists]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// `hapteron stability`
+#[derive(Args, Debug)]
+pub struct Stability {
+    /// The scene (TOML); without a hand it is held with a medium grip
+    #[arg(value_name = "SCENE.toml")]
+    pub scene: PathBuf,
+    /// The key to the right with its range, as in body.mass=0.001:0.1:7, or values, as in hand.grip=light,firm
+    #[arg(long, value_name = "KEY=LO:HI:N")]
+    pub x: String,
+    /// The key upward, written like --x
+    #[arg(long, value_name = "KEY=LO:HI:N")]
+    pub y: String,
+    /// Override a key of the scene for all cells; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+    /// Folder for the results [default: runs/stability-NAME, numbered when it exists]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

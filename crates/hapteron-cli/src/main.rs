@@ -24,6 +24,7 @@ fn main() -> ExitCode {
         Command::Compare(a) => commands::compare::compare(&a),
         Command::Bench(a) => commands::bench::bench(&a),
         Command::Devices(a) => commands::devices::devices(&a),
+        Command::Stability(a) => commands::stability::stability(&a),
         Command::Models(a) => commands::models::models(&a),
     };
     match outcome {

@@ -10,3 +10,4 @@ pub mod query;
 mod real_time;
 pub mod reproduce;
 pub mod run;
+pub mod stability;

@@ -5,11 +5,13 @@ mod picture;
 mod plot;
 mod reproduction;
 mod run;
+mod stability;
 mod timing;
 
 pub use compare::{Compared, comparison};
 pub use reproduction::reproduction;
 pub use run::{Live, Outcome, Time, run};
+pub use stability::stability;
 pub use timing::{distribution_json, json as timing_json};
 
 use base64::Engine;

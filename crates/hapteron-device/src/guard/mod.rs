@@ -25,6 +25,8 @@ const STILL_TICKS: u32 = 20;
 const LOST_AFTER: f64 = 1.0;
 /// A late tick counts as this many at the most, in slews and ramps.
 const LATEST: f64 = 2.0;
+/// Most samples that a device may act late.
+const MOST_DELAY: usize = 2;
 /// A force below this share of the greatest is none, for the passivity observer.
 const IDLE_SHARE: f64 = 0.005;
 
@@ -61,6 +63,8 @@ pub struct Guard {
     fault: Option<GuardFault>,
     /// The last command that was let through.
     last: DeviceCommand,
+    /// The ones before it, newest first.
+    older: [DeviceCommand; MOST_DELAY],
     /// Time and sample of the last pass.
     before: Option<(f64, DeviceSample)>,
     /// Share of the force that is let through, 0 to 1.
@@ -84,6 +88,7 @@ impl Guard {
             settings,
             fault: None,
             last: DeviceCommand::zero(),
+            older: [DeviceCommand::zero(); MOST_DELAY],
             before: None,
             gain: 0.0,
             fast_ticks: 0,
@@ -143,14 +148,17 @@ impl Guard {
             let dt = self.elapsed(input.time);
             fault = fault.or_else(|| self.watch(input, dt, &mut status));
             if fault.is_none() {
-                let to_hand = self.energy_to_hand(&input.sample);
-                let wanted = self.wanted(input, to_hand, dt, &mut status);
+                let moved = self.moved(&input.sample);
+                let acted = self.acted();
+                let to_hand = acted.force.dot(&moved[0]) + acted.torque.dot(&moved[1]);
+                let wanted = self.wanted(input, &moved, to_hand, dt, &mut status);
                 let command = self.limited(&wanted, &input.sample, dt, &mut status);
                 let s = &self.settings;
                 let thresholds = [s.oscillation_force, s.oscillation_torque];
                 if self.oscillation.take(&command, to_hand, thresholds, dt) {
                     fault = Some(GuardFault::Oscillation);
                 } else if within(&command, s) {
+                    self.older = [self.last, self.older[0]];
                     self.last = command;
                 } else {
                     fault = Some(GuardFault::NotFinite);
@@ -220,19 +228,27 @@ impl Guard {
         faults.into_iter().find(|f| f.0).map(|f| f.1)
     }
 
-    /// What the last command, held since, gave the hand on its way to this sample, J.
-    fn energy_to_hand(&self, sample: &DeviceSample) -> f64 {
-        let Some((_, before)) = &self.before else {
-            return 0.0;
-        };
-        let turn = small_turn(before, sample);
-        self.last.force.dot(&(sample.position - before.position)) + self.last.torque.dot(&turn)
+    /// The command that the device held since the last pass.
+    fn acted(&self) -> DeviceCommand {
+        match self.settings.delay.checked_sub(1) {
+            None => self.last,
+            Some(i) => self.older.get(i).copied().unwrap_or(self.last),
+        }
+    }
+
+    /// How far the handle went and turned since the last pass.
+    fn moved(&self, sample: &DeviceSample) -> [Vector3<f64>; 2] {
+        match &self.before {
+            Some((_, before)) => [sample.position - before.position, small_turn(before, sample)],
+            None => [Vector3::zeros(); 2],
+        }
     }
 
     /// The command with ramp and passivity controller, before limits.
     fn wanted(
         &mut self,
         input: &GuardInput,
+        moved: &[Vector3<f64>; 2],
         to_hand: f64,
         dt: f64,
         status: &mut GuardStatus,
@@ -247,7 +263,7 @@ impl Guard {
             command.torque = Vector3::zeros();
         }
         if s.passivity {
-            let (damped, any) = self.passivity.control(&command, &input.sample, s.max_damping, dt);
+            let (damped, any) = self.passivity.control(&command, moved, s.max_damping, dt);
             if any {
                 status.set(GuardStatus::DAMPED);
             }

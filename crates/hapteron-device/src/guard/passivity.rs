@@ -1,6 +1,7 @@
 //! Time-domain passivity observer and controller (Hannaford and Ryu 2002; method.md G.1).
 
-use crate::{DeviceCommand, DeviceSample};
+use crate::DeviceCommand;
+use nalgebra::Vector3;
 
 /// Radius by which the controller's damping becomes that of rotation, metres.
 const RADIUS: f64 = 0.02;
@@ -35,15 +36,16 @@ impl PassivityObserver {
         }
     }
 
-    /// The command with the damping that brings the observed energy back to zero, within `most` (N s/m); whether any was needed.
+    /// The command with the damping that brings the observed energy back to zero, within `most` (N s/m); whether any was needed. `moved` is how far
+    /// the handle went and turned since the last pass: a filtered velocity would come too late to damp.
     pub fn control(
         &self,
         command: &DeviceCommand,
-        sample: &DeviceSample,
+        moved: &[Vector3<f64>; 2],
         most: f64,
         dt: f64,
     ) -> (DeviceCommand, bool) {
-        let (v, omega) = (sample.linear_velocity, sample.angular_velocity);
+        let (v, omega) = (moved[0] / dt, moved[1] / dt);
         let speed2 = v.norm_squared() + omega.norm_squared() * (RADIUS * RADIUS);
         if !(self.energy < 0.0 && speed2 > LEAST_SPEED * LEAST_SPEED) {
             return (*command, false);

@@ -44,6 +44,8 @@ pub struct GuardSettings {
     pub oscillation_force: f64,
     /// The same for the torque, N m.
     pub oscillation_torque: f64,
+    /// A command acts so many samples late, 0 to 2: for the energy that is observed.
+    pub delay: usize,
     /// Whether time-domain passivity is controlled.
     pub passivity: bool,
     /// Damping of the passivity controller at the most, N s/m.
@@ -58,7 +60,7 @@ impl std::fmt::Display for GuardError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "guard.{} is {}; it must be positive, or 0 for a force or torque, and below 1e12",
+            "guard.{} is {}; it must be positive (a force, torque or delay may be 0) and below 1e12, a delay no more than 2",
             self.0, self.1
         )
     }
@@ -98,6 +100,7 @@ impl GuardSettings {
             samples_stale_after: 0.01,
             oscillation_force: OSCILLATION_SHARE * force,
             oscillation_torque: OSCILLATION_SHARE * torque,
+            delay: 0,
             passivity: false,
             max_damping: MOST_DAMPING,
         }
@@ -125,6 +128,7 @@ impl GuardSettings {
         let first = positive.iter().find(|(_, v)| wrong(false, *v));
         match first.or_else(|| not_negative.iter().find(|(_, v)| wrong(true, *v))) {
             Some(&(name, value)) => Err(GuardError(name, value)),
+            None if self.delay > 2 => Err(GuardError("delay", self.delay as f64)),
             None => Ok(()),
         }
     }

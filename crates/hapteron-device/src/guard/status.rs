@@ -59,7 +59,7 @@ pub enum GuardFault {
     Simulation,
     /// The handle moved faster than allowed.
     OverSpeed,
-    /// The force kept swinging to and fro, between 20 Hz and half the rate, and fed the hand energy or was violent.
+    /// The force kept swinging to and fro, between 8 Hz and half the rate, and fed the hand energy or was violent.
     Oscillation,
     /// The time stood still or ran backward from tick to tick.
     Clock,

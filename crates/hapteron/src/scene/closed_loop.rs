@@ -134,7 +134,7 @@ impl Resolver<'_> {
         time_step: f64,
     ) -> Resolved<Option<GuardSettings>> {
         let enabled = *keys.enabled.get_or_insert(real || hand);
-        let settings = guard_settings(keys, &simulated.model.capabilities(), time_step);
+        let settings = guard_settings(keys, &simulated.model.capabilities(), simulated.delay, time_step);
         Guard::new(settings).map_err(|e| self.source.fault(&format!("guard.{}", e.0), e.to_string()))?;
         if !real {
             // Of a real device only the device itself knows the limits.
@@ -157,7 +157,12 @@ pub(super) fn write_out(keys: &mut file::Guard, settings: &GuardSettings) {
 }
 
 /// The limits for a device: the scene's where it has them, else the device's.
-pub(super) fn guard_settings(keys: &file::Guard, device: &Capabilities, time_step: f64) -> GuardSettings {
+pub(super) fn guard_settings(
+    keys: &file::Guard,
+    device: &Capabilities,
+    delay: usize,
+    time_step: f64,
+) -> GuardSettings {
     let of_device = GuardSettings::for_device(device, time_step);
     let max_force = keys.max_force.unwrap_or(of_device.max_force);
     let max_torque = keys.max_torque.unwrap_or(of_device.max_torque);
@@ -167,6 +172,7 @@ pub(super) fn guard_settings(keys: &file::Guard, device: &Capabilities, time_ste
     };
     let max_slew = keys.max_slew.unwrap_or(usual.max_slew);
     GuardSettings {
+        delay,
         max_slew,
         max_torque_slew: usual.max_torque_slew * (max_slew / usual.max_slew),
         max_power: keys.max_power.unwrap_or(usual.max_power),

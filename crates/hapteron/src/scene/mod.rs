@@ -190,9 +190,14 @@ impl Scene {
         if self.file.guard.enabled == Some(false) {
             return Ok(None);
         }
-        Guard::new(closed_loop::guard_settings(&self.file.guard, device, self.time_step))
-            .map(Some)
-            .map_err(fault)
+        Guard::new(closed_loop::guard_settings(
+            &self.file.guard,
+            device,
+            self.simulated.delay,
+            self.time_step,
+        ))
+        .map(Some)
+        .map_err(fault)
     }
 
     /// Takes the limits of a device that is open into the scene, for its guard and for [`Scene::to_toml`].

@@ -63,6 +63,20 @@ impl ContactSnapshot {
         }
     }
 
+    /// Contacts that were found by other means than a [`ContactPass`], at a state of `time`; no more than [`MAX_PLANES`] are taken.
+    #[must_use]
+    pub fn of_planes(planes: &[ContactPlane], body: &RigidBody, state: &State, time: f64) -> Self {
+        let mut snapshot = Self::empty(body, state);
+        let (planes, thinned) = (&planes[..planes.len().min(MAX_PLANES)], planes.len() > MAX_PLANES);
+        snapshot.planes.extend_from_slice(planes);
+        snapshot.linearized = LinearizedContact::from_planes(planes, body, state);
+        snapshot.contacts = planes.len() as u32;
+        snapshot.clusters = planes.len() as u32;
+        snapshot.flags = if thinned { Flags::CONTACTS_THINNED } else { Flags::default() };
+        snapshot.time = time;
+        snapshot
+    }
+
     /// The planes, those of the anticipation margin included.
     #[must_use]
     pub fn planes(&self) -> &[ContactPlane] {
