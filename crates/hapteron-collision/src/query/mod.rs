@@ -10,6 +10,7 @@
 mod feature;
 mod kernel;
 mod result;
+mod ridge_kernel;
 mod ridges;
 mod side;
 mod vertices;
@@ -149,7 +150,7 @@ pub fn query<'a>(
     let mut sink = Sink { pair, world_from_obstacle, contacts, least: f64::INFINITY };
     vertices::of_body(pair, &walk.body, body_side, scratch, &mut sink);
     vertices::of_obstacle(pair, &walk.obstacle, obstacle_side, scratch, &mut sink);
-    ridges::find(pair, &walk.body, [body_side, obstacle_side], ridges, scratch, &mut sink);
+    ridges::find(pair, &walk.body, [body_side, obstacle_side], ridges, &mut sink);
     let min_distance = sink.least;
     QueryResult { min_distance, contacts: &workspace.contacts }
 }

@@ -2,57 +2,90 @@
 
 use super::Pair;
 use super::feature::Feature;
-use super::kernel::{self, Box32, LeafBounds, RidgeBlock};
 use super::result::{Found, Sink};
+use super::ridge_kernel::{RidgeBlock, SegmentBlock};
 use super::side::Side;
-use super::vertices::Scratch;
 use super::walk::{Neighbourhood, Neighbours};
-use crate::surface::{Edge, EdgeKind, LANES, Surface};
-use crate::vector::{Rigid, Vec3, add, cross, dot, norm, scale, sub, unit_or};
+use crate::surface::{Cone, Edge, EdgeKind, LANES, Leaf, Surface};
+use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or};
 
 /// Slack of the test whether a direction lies in an edge's normal cone (its cosine; the cones are in single precision).
-const CONE_SLACK: f64 = 1e-4;
+const CONE_SLACK: f64 = Cone::SLACK as f64;
 /// The middle of an edge shows more than its ends when it is closer to the other surface by this share of the tolerance.
 const WORTH: f64 = 0.1;
 /// Edges closer than this (metres) have no direction between them.
 const TOUCHING: f64 = 1e-12;
 
-/// Edges of the obstacle's leaves, gathered when a query first needs them.
+/// Memory of the search.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ridges {
+    /// Edges of the obstacle's leaves, gathered when a query first needs them.
     blocks: Vec<RidgeBlock>,
-    /// By leaf of the obstacle: its range of `blocks`, when gathered.
-    range: Vec<Option<(u32, u32)>>,
+    /// By leaf of the obstacle: where its blocks begin, plus one (zero: not gathered), and end.
+    range: Vec<[u32; 2]>,
     gathered: Vec<u32>,
+    /// The edges of a leaf of the body, and eight at a time.
+    own: Vec<Ridge>,
+    segments: Vec<SegmentBlock>,
 }
 
 /// An edge of the body in the obstacle's frame.
+#[derive(Clone, Copy, Debug)]
 struct Ridge {
     start: Vec3,
     along: Vec3,
     outward: Vec3,
     within: f64,
+    cone: Cone,
     index: u32,
 }
 
 impl Ridges {
     pub(super) fn clear(&mut self, obstacle: &Surface) {
         for &leaf in &self.gathered {
-            self.range[leaf as usize] = None;
+            self.range[leaf as usize] = [0; 2];
         }
         self.gathered.clear();
         self.blocks.clear();
-        self.range.resize(obstacle.leaves.len(), None);
+        self.range.resize(obstacle.leaves.len(), [0; 2]);
     }
 
+    /// The edges of a leaf of the body that may show more than their ends do.
     #[inline(always)]
-    fn gather(&mut self, pair: Pair<'_>, side: &Side, leaf: u32, least: f64) -> (u32, u32) {
-        if let Some(range) = self.range[leaf as usize] {
-            return range;
+    fn gather_own(&mut self, pair: Pair<'_>, side: &Side, leaf: &Leaf, least: f64) {
+        self.own.clear();
+        self.segments.clear();
+        for index in leaf.first_edge..leaf.first_edge + u32::from(leaf.ridges) {
+            let edge = &pair.body.edges[index as usize];
+            let within = reach(edge, side, pair, least);
+            if within <= 0.0 {
+                continue;
+            }
+            let [a, b] = edge.vertices.map(|v| pair.motion.point(pair.body.vertices[v as usize]));
+            let outward = pair.motion.direction(edge.normal.map(f64::from));
+            let cone = Cone::wide(outward.map(|c| c as f32), edge.cone);
+            let lane = self.own.len() % LANES;
+            if lane == 0 {
+                self.segments.push(SegmentBlock::EMPTY);
+            }
+            if let Some(block) = self.segments.last_mut() {
+                block.set(lane, [a, b].map(|p| p.map(|c| c as f32)), (within as f32).next_up());
+            }
+            self.own.push(Ridge { start: a, along: sub(b, a), outward, within, cone, index });
+        }
+    }
+
+    /// The blocks of the edges of a leaf of the obstacle that may show more than their ends do.
+    #[inline(always)]
+    fn gather(&mut self, pair: Pair<'_>, side: &Side, leaf: u32, least: f64) -> (usize, usize) {
+        let [begin, end] = self.range[leaf as usize];
+        if begin > 0 {
+            return (begin as usize - 1, end as usize);
         }
         let surface = pair.obstacle;
         let begin = self.blocks.len();
         let own = &surface.leaves[leaf as usize];
+        let origin = surface.blocks[leaf as usize].origin;
         let mut lane = LANES;
         for index in own.first_edge..own.first_edge + u32::from(own.ridges) {
             let edge = &surface.edges[index as usize];
@@ -61,31 +94,32 @@ impl Ridges {
                 continue;
             }
             if lane == LANES {
-                self.blocks.push(RidgeBlock::EMPTY);
+                self.blocks.push(RidgeBlock::empty(origin));
                 lane = 0;
             }
-            let [a, b] = edge.vertices.map(|v| surface.vertices[v as usize]);
+            let ends = edge.vertices.map(|v| local(surface.vertices[v as usize], origin));
             if let Some(block) = self.blocks.last_mut() {
-                for axis in 0..3 {
-                    block.start[axis][lane] = a[axis];
-                    block.along[axis][lane] = b[axis] - a[axis];
-                }
-                block.within_squared[lane] = within * within;
-                block.edge[lane] = index;
+                let cone = Cone::wide(edge.normal, edge.cone);
+                block.set(lane, index, ends, cone, (within as f32).next_up());
             }
             lane += 1;
         }
-        let range = (begin as u32, self.blocks.len() as u32);
-        self.range[leaf as usize] = Some(range);
+        self.range[leaf as usize] = [begin as u32 + 1, self.blocks.len() as u32];
         self.gathered.push(leaf);
-        range
+        (begin, self.blocks.len())
     }
+}
+
+/// A point about an origin, in single precision.
+#[inline(always)]
+fn local(p: Vec3, origin: [f32; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|k| (p[k] - f64::from(origin[k])) as f32)
 }
 
 /// How close the middle of an edge must come to another edge to show more than its ends do; zero when an end lies inside.
 #[inline(always)]
 fn reach(edge: &Edge, side: &Side, pair: Pair<'_>, least: f64) -> f64 {
-    let [a, b] = edge.vertices.map(|v| side.signed[v as usize]);
+    let [a, b] = edge.vertices.map(|v| side.signed_distance(v));
     let ends = a.min(b);
     if ends <= 0.0 {
         0.0
@@ -104,39 +138,35 @@ pub(super) fn find(
     neighbours: &Neighbours,
     [body, obstacle]: [&Side; 2],
     ridges: &mut Ridges,
-    scratch: &mut Scratch,
     sink: &mut Sink<'_>,
 ) {
     let slack = pair.slack() as f32;
     // Edges may only show more than the vertices did, so the vertices' least distance is what they must beat.
     let least = sink.least.min(pair.tolerance);
     for &Neighbourhood { leaf, begin, end } in &neighbours.of {
-        let near = &neighbours.near[begin as usize..end as usize];
-        scratch.clear();
-        for eight in near.chunks(LANES) {
-            scratch.push(LeafBounds::gather(pair.obstacle, eight));
-        }
         let own = &pair.body.leaves[leaf as usize];
-        for index in own.first_edge..own.first_edge + u32::from(own.ridges) {
-            let edge = &pair.body.edges[index as usize];
-            let within = reach(edge, body, pair, least);
-            if within <= 0.0 {
+        ridges.gather_own(pair, body, own, least);
+        if ridges.own.is_empty() {
+            continue;
+        }
+        let axis = pair.motion.direction(own.ridge_cone.axis.map(f64::from)).map(|c| c as f32);
+        let cone = Cone { axis, ..own.ridge_cone };
+        for &other in &neighbours.near[begin as usize..end as usize] {
+            let theirs = &pair.obstacle.leaves[other as usize];
+            if theirs.ridges == 0 || !cone.faces_cone(&theirs.ridge_cone) {
                 continue;
             }
-            let ridge = moved(pair.body, edge, index, within, pair.motion);
-            let bounds = bounds(&ridge);
-            let ends = [ridge.start, add(ridge.start, ridge.along)].map(|p| p.map(|c| c as f32));
-            for (eight, leaf_bounds) in near.chunks(LANES).zip(scratch.iter()) {
-                let lower = leaf_bounds.segment_lower(&bounds, ends, slack);
-                for (&other, &lower) in eight.iter().zip(&lower) {
-                    if f64::from(lower) >= within && lower > 0.0 {
-                        continue;
-                    }
+            for eight in 0..ridges.segments.len() {
+                let (mut mask, meeting) = ridges.segments[eight].near(theirs, slack);
+                while mask != 0 {
+                    let lane = mask.trailing_zeros() as usize;
+                    mask &= mask - 1;
                     // Edges that have passed each other lie in leaves that overlap.
-                    let crossing = if lower <= 0.0 { pair.tolerance } else { 0.0 };
-                    let (first, last) = ridges.gather(pair, obstacle, other, least);
-                    for block in &ridges.blocks[first as usize..last as usize] {
-                        meet(pair, &ridge, block, crossing * crossing, sink);
+                    let crossing = if meeting >> lane & 1 == 1 { pair.tolerance } else { 0.0 };
+                    let range = ridges.gather(pair, obstacle, other, least);
+                    let ridge = ridges.own[eight * LANES + lane];
+                    for block in &ridges.blocks[range.0..range.1] {
+                        meet(pair, &ridge, block, crossing, |edge| reach(edge, obstacle, pair, least), sink);
                     }
                 }
             }
@@ -145,56 +175,52 @@ pub(super) fn find(
 }
 
 #[inline(always)]
-fn moved(surface: &Surface, edge: &Edge, index: u32, within: f64, motion: &Rigid) -> Ridge {
-    let [a, b] = edge.vertices.map(|v| motion.point(surface.vertices[v as usize]));
-    Ridge { start: a, along: sub(b, a), outward: motion.direction(edge.normal.map(f64::from)), within, index }
-}
-
-#[inline(always)]
-fn bounds(ridge: &Ridge) -> Box32 {
-    let mut result = Box32 { min: [0.0; 3], max: [0.0; 3] };
-    for axis in 0..3 {
-        let (a, b) = (ridge.start[axis], ridge.start[axis] + ridge.along[axis]);
-        let slack = 2e-7 * a.abs().max(b.abs()) as f32;
-        result.min[axis] = a.min(b) as f32 - slack;
-        result.max[axis] = a.max(b) as f32 + slack;
-    }
-    result
-}
-
-#[inline(always)]
-fn meet(pair: Pair<'_>, ridge: &Ridge, block: &RidgeBlock, crossing_squared: f64, sink: &mut Sink<'_>) {
-    let mut mask = kernel::ridge_ridges(
-        ridge.start,
-        ridge.along,
-        ridge.outward,
-        ridge.within * ridge.within,
-        crossing_squared,
-        block,
-    );
+fn meet(
+    pair: Pair<'_>,
+    ridge: &Ridge,
+    block: &RidgeBlock,
+    crossing: f64,
+    reach: impl Fn(&Edge) -> f64,
+    sink: &mut Sink<'_>,
+) {
+    let start = local(ridge.start, block.origin);
+    let along = ridge.along.map(|c| c as f32);
+    let (within, crossing32) = ((ridge.within as f32).next_up(), (crossing as f32).next_up());
+    let mut mask = block.meeting(start, along, &ridge.cone, within, crossing32);
     while mask != 0 {
         let lane = mask.trailing_zeros() as usize;
         mask &= mask - 1;
-        let axis3 = |a: &[[f64; LANES]; 3]| [a[0][lane], a[1][lane], a[2][lane]];
-        if let Some(found) = judge(pair, ridge, block.edge[lane], axis3(&block.start), axis3(&block.along)) {
+        let other = &pair.obstacle.edges[block.edge[lane] as usize];
+        let within = ridge.within.min(reach(other));
+        if let Some(found) = judge(pair, ridge, block.edge[lane], within, crossing) {
             sink.push(found);
         }
     }
 }
 
-/// The contact of two edges, when their common perpendicular is one that surfaces with these edges can touch along.
-fn judge(pair: Pair<'_>, ridge: &Ridge, other: u32, start: Vec3, along: Vec3) -> Option<Found> {
+/// The contact of two edges, when their common perpendicular is short enough and one that surfaces with these edges can touch along.
+fn judge(pair: Pair<'_>, ridge: &Ridge, other: u32, within: f64, crossing: f64) -> Option<Found> {
+    let theirs = &pair.obstacle.edges[other as usize];
+    let [start, end] = theirs.vertices.map(|v| pair.obstacle.vertices[v as usize]);
+    let along = sub(end, start);
     let (d, e, r) = (ridge.along, along, sub(ridge.start, start));
     let (a, ee, b) = (dot(d, d), dot(e, e), dot(d, e));
     let (c, f) = (dot(d, r), dot(e, r));
     let whole = a * ee - b * b;
-    let p = add(ridge.start, scale(d, (b * f - c * ee) / whole));
-    let q = add(start, scale(e, (a * f - b * c) / whole));
+    let (s, t) = ((b * f - c * ee) / whole, (a * f - b * c) / whole);
+    // Comparisons with a NaN (parallel edges) are false.
+    if !(s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0) {
+        return None;
+    }
+    let (p, q) = (add(ridge.start, scale(d, s)), add(start, scale(e, t)));
     let mine = &pair.body.edges[ridge.index as usize];
-    let theirs = &pair.obstacle.edges[other as usize];
     let their_outward = theirs.normal.map(f64::from);
     let between = sub(q, p);
     let distance = norm(between);
+    let limit = if dot(between, ridge.outward) < 0.0 { crossing } else { within };
+    if !(distance < limit) {
+        return None;
+    }
     let features = [Feature::Edge(ridge.index), Feature::Edge(other)];
     if distance < TOUCHING {
         let normal = unit_or(sub(ridge.outward, their_outward), cross(d, e));

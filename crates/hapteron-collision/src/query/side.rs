@@ -2,36 +2,75 @@
 
 use crate::surface::Surface;
 
-/// Marks a vertex that has had no closest leaf.
-pub(super) const NOWHERE: u32 = u32::MAX;
+/// Vertices whose results lie together. Near vertices have close numbers, so few pages are ever used.
+const PAGE: usize = 64;
 
 /// Per-vertex results on one surface.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Side {
-    /// By vertex: signed distance to the other surface, infinite when farther than the tolerance.
-    pub signed: Vec<f64>,
-    /// Vertices with a finite signed distance, in the order found.
-    pub found: Vec<u32>,
-    /// By vertex: the leaf of the other surface that was closest in the last query, a first guess for the next one.
-    pub last: Vec<u32>,
+    /// By page of vertices: where its results are, plus one; zero when none of its vertices has any.
+    pages: Vec<u32>,
+    results: Vec<Page>,
+    /// Vertices with a signed distance, in the order found.
+    found: Vec<u32>,
+}
+
+#[derive(Clone, Debug)]
+struct Page {
+    /// Signed distance to the other surface, infinite when farther than the tolerance.
+    signed: [f64; PAGE],
+    /// The leaf of the other surface that was closest in the last query, plus one.
+    last: [u32; PAGE],
 }
 
 impl Side {
     /// Forgets everything and makes room for a surface.
     pub(super) fn reset(&mut self, surface: &Surface) {
         self.found.clear();
-        self.found.reserve(surface.vertices.len());
-        self.signed.clear();
-        self.signed.resize(surface.vertices.len(), f64::INFINITY);
-        self.last.clear();
-        self.last.resize(surface.vertices.len(), NOWHERE);
+        self.results.clear();
+        self.pages.clear();
+        self.pages.resize(surface.vertices.len().div_ceil(PAGE), 0);
     }
 
     /// Forgets the distances of the last query, at a cost in proportion to what it found.
     pub(super) fn clear(&mut self) {
         for &vertex in &self.found {
-            self.signed[vertex as usize] = f64::INFINITY;
+            if let Some(page) = self.pages[vertex as usize / PAGE].checked_sub(1) {
+                self.results[page as usize].signed[vertex as usize % PAGE] = f64::INFINITY;
+            }
         }
         self.found.clear();
+    }
+
+    #[inline(always)]
+    fn page(&self, vertex: u32) -> Option<&Page> {
+        let page = self.pages[vertex as usize / PAGE].checked_sub(1)?;
+        self.results.get(page as usize)
+    }
+
+    /// Signed distance of a vertex to the other surface, infinite when farther than the tolerance.
+    #[inline(always)]
+    pub(super) fn signed_distance(&self, vertex: u32) -> f64 {
+        self.page(vertex).map_or(f64::INFINITY, |page| page.signed[vertex as usize % PAGE])
+    }
+
+    /// The leaf of the other surface that was closest when last asked, a first guess for the next time.
+    #[inline(always)]
+    pub(super) fn last_leaf(&self, vertex: u32) -> Option<u32> {
+        self.page(vertex).and_then(|page| page.last[vertex as usize % PAGE].checked_sub(1))
+    }
+
+    /// Notes the signed distance of a vertex and the leaf where it was found.
+    #[inline(always)]
+    pub(super) fn set(&mut self, vertex: u32, signed_distance: f64, leaf: u32) {
+        let place = &mut self.pages[vertex as usize / PAGE];
+        if *place == 0 {
+            self.results.push(Page { signed: [f64::INFINITY; PAGE], last: [0; PAGE] });
+            *place = self.results.len() as u32;
+        }
+        let page = &mut self.results[*place as usize - 1];
+        page.signed[vertex as usize % PAGE] = signed_distance;
+        page.last[vertex as usize % PAGE] = leaf + 1;
+        self.found.push(vertex);
     }
 }

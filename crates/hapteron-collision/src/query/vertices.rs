@@ -4,9 +4,9 @@ use super::Pair;
 use super::feature::{self, Feature, Foot};
 use super::kernel::{self, LeafBounds};
 use super::result::{Found, Sink};
-use super::side::{NOWHERE, Side};
+use super::side::Side;
 use super::walk::{Neighbourhood, Neighbours};
-use crate::surface::{LANES, Surface, VertexNormal};
+use crate::surface::{ERROR, LANES, Surface, VertexNormal};
 use crate::vector::{Rigid, Vec3, dot, scale};
 
 /// Where the vertices of one surface look for their feet on the other.
@@ -19,10 +19,45 @@ struct Search<'a> {
     tolerance: f64,
     /// Rounding of single-precision coordinates, metres.
     slack: f32,
+    /// Rounding of a distance within the tolerance, to which that of a block is added, metres.
+    error: f32,
 }
 
-/// Bounds of the leaves in a neighbourhood, eight at a time; kept to reuse its memory.
-pub(super) type Scratch = Vec<LeafBounds>;
+/// Memory of the search, kept to be reused.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch {
+    /// Bounds of the leaves in a neighbourhood, eight at a time.
+    pub bounds: Vec<LeafBounds>,
+    probes: Vec<Probe>,
+    lowers: Vec<[f32; LANES]>,
+    looks: Vec<Look>,
+}
+
+/// A vertex in search of its foot.
+#[derive(Clone, Copy, Debug)]
+struct Probe {
+    vertex: u32,
+    point: Vec3,
+    /// The closest triangle is not farther than this.
+    within: f32,
+    /// The leaf to look in first.
+    guess: u32,
+    /// Its neighbourhood, a range of the near leaves.
+    begin: u32,
+    end: u32,
+    /// Where its bounds of those begin.
+    lowers: u32,
+    best: Option<(u32, Foot)>,
+}
+
+/// A leaf in which a probe looks: the squared distances of its triangles, and how certain these are.
+#[derive(Clone, Copy, Debug)]
+struct Look {
+    probe: u32,
+    leaf: u32,
+    error: f32,
+    squared: [f32; LANES],
+}
 
 /// Gives every vertex of the body within the tolerance its signed distance, and makes its contact.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
@@ -40,6 +75,7 @@ pub(super) fn of_body(
         motion: pair.motion,
         tolerance: pair.tolerance,
         slack: pair.slack() as f32,
+        error: ERROR * pair.tolerance as f32,
     };
     run(&search, side, scratch, |vertex, point, foot| push_body_vertex(pair, vertex, point, foot, sink));
 }
@@ -60,85 +96,139 @@ pub(super) fn of_obstacle(
         motion: pair.inverse,
         tolerance: pair.tolerance,
         slack: pair.slack() as f32,
+        error: ERROR * pair.tolerance as f32,
     };
     run(&search, side, scratch, |vertex, _, foot| push_obstacle_vertex(pair, vertex, foot, sink));
 }
 
+/// Vertices are searched for in batches of about this many, stage by stage: the same inner loop many times over.
+const BATCH: usize = 64;
+
 #[inline(always)]
 fn run(search: &Search<'_>, side: &mut Side, scratch: &mut Scratch, mut push: impl FnMut(u32, Vec3, &Foot)) {
-    for &Neighbourhood { leaf, begin, end } in &search.neighbours.of {
-        let near = &search.neighbours.near[begin as usize..end as usize];
-        scratch.clear();
-        for eight in near.chunks(LANES) {
-            scratch.push(LeafBounds::gather(search.other, eight));
+    scratch.probes.clear();
+    for (i, neighbourhood) in search.neighbours.of.iter().enumerate() {
+        probes_of_leaf(search, side, scratch, neighbourhood);
+        let last = i + 1 == search.neighbours.of.len();
+        if scratch.probes.len() < BATCH && !last {
+            continue;
         }
-        let own = &search.own.leaves[leaf as usize];
-        for vertex in own.first_vertex..own.first_vertex + u32::from(own.vertices) {
-            let point = search.motion.point(search.own.vertices[vertex as usize]);
-            let last = &mut side.last[vertex as usize];
-            let triangle = nearest_triangle(search, point, near, scratch, last);
-            if triangle == NOWHERE {
-                continue;
-            }
-            let foot = feature::foot(point, triangle, search.other);
-            side.signed[vertex as usize] = foot.signed_distance;
-            side.found.push(vertex);
-            push(vertex, point, &foot);
+        look_in_guesses(search, scratch);
+        look_elsewhere(search, scratch);
+        settle(search, scratch);
+        for probe in &scratch.probes {
+            let Some((triangle, foot)) = probe.best else { continue };
+            side.set(probe.vertex, foot.signed_distance, triangle / LANES as u32);
+            push(probe.vertex, probe.point, &foot);
         }
+        scratch.probes.clear();
+        scratch.lowers.clear();
     }
 }
 
-/// The closest triangle so far.
-struct Nearest {
-    squared: f64,
-    triangle: u32,
-    leaf: u32,
-}
-
-impl Nearest {
-    #[inline(always)]
-    fn look(&mut self, surface: &Surface, leaf: u32, point: Vec3) {
-        let (squared, lane) = kernel::point_triangles(point, &surface.blocks[leaf as usize]);
-        if squared < self.squared {
-            let triangle = surface.leaves[leaf as usize].triangle(lane);
-            *self = Self { squared, triangle, leaf };
-        }
-    }
-}
-
-/// The closest triangle within the tolerance among the leaves in `near`; `last` is the leaf to look in first, and becomes
-/// the one where it was.
+/// Makes a probe of every vertex of a leaf that may be within the tolerance of a near leaf.
 #[inline(always)]
-fn nearest_triangle(
-    search: &Search<'_>,
-    point: Vec3,
-    near: &[u32],
-    bounds: &[LeafBounds],
-    last: &mut u32,
-) -> u32 {
-    let mut nearest =
-        Nearest { squared: search.tolerance * search.tolerance, triangle: NOWHERE, leaf: NOWHERE };
-    let mut first = *last;
-    if first != NOWHERE {
-        nearest.look(search.other, first, point);
+fn probes_of_leaf(search: &Search<'_>, side: &Side, scratch: &mut Scratch, of: &Neighbourhood) {
+    let &Neighbourhood { leaf, begin, end } = of;
+    let near = &search.neighbours.near[begin as usize..end as usize];
+    scratch.bounds.clear();
+    for eight in near.chunks(LANES) {
+        scratch.bounds.push(LeafBounds::gather(search.other, eight));
     }
-    let point32 = point.map(|c| c as f32);
-    for (eight, bounds) in near.chunks(LANES).zip(bounds) {
-        let (lower, mut mask) = bounds.lower(point32, search.slack, nearest.squared as f32 * (1.0 + 1e-6));
-        // Without a first guess begin with the closest box: its triangles usually rule out the others.
-        let mut lane =
-            if first == NOWHERE { kernel::first_least32(&lower) } else { mask.trailing_zeros() as usize };
-        while mask != 0 {
-            mask &= !(1 << lane);
-            if f64::from(lower[lane]) < nearest.squared * (1.0 + 1e-6) && eight[lane] != first {
-                nearest.look(search.other, eight[lane], point);
+    let within = (search.tolerance as f32).next_up();
+    let limit = within * within * ROUNDING;
+    let own = &search.own.leaves[leaf as usize];
+    for vertex in own.first_vertex..own.first_vertex + u32::from(own.vertices) {
+        let point = search.motion.point(search.own.vertices[vertex as usize]);
+        let point32 = point.map(|c| c as f32);
+        let lowers = scratch.lowers.len();
+        let mut least = (f32::INFINITY, 0);
+        for (group, bounds) in scratch.bounds.iter().enumerate() {
+            let lower = bounds.lower(point32, search.slack);
+            let own = kernel::least(&lower);
+            if own < least.0 {
+                let lane = kernel::at_most(&lower, own).trailing_zeros() as usize;
+                least = (own, group * LANES + lane);
             }
-            lane = mask.trailing_zeros() as usize;
+            scratch.lowers.push(lower);
         }
-        first = if nearest.leaf != NOWHERE && first == NOWHERE { nearest.leaf } else { first };
+        if !(least.0 < limit) {
+            scratch.lowers.truncate(lowers);
+            continue;
+        }
+        // Without memory begin with the closest box: its triangles usually rule out the others.
+        let guess = side.last_leaf(vertex).unwrap_or(near[least.1]);
+        let lowers = lowers as u32;
+        scratch.probes.push(Probe { vertex, point, within, guess, begin, end, lowers, best: None });
     }
-    *last = nearest.leaf;
-    nearest.triangle
+}
+
+#[inline(always)]
+fn look_in_guesses(search: &Search<'_>, scratch: &mut Scratch) {
+    let Scratch { probes, looks, .. } = scratch;
+    looks.clear();
+    for (index, probe) in probes.iter_mut().enumerate() {
+        looks.push(look(search, probe, index as u32, probe.guess));
+    }
+}
+
+/// Looks in all leaves that are not farther than the closest triangle so far.
+#[inline(always)]
+fn look_elsewhere(search: &Search<'_>, scratch: &mut Scratch) {
+    let Scratch { probes, lowers, looks, .. } = scratch;
+    for (index, probe) in probes.iter_mut().enumerate() {
+        let near = &search.neighbours.near[probe.begin as usize..probe.end as usize];
+        for (eight, lower) in near.chunks(LANES).zip(&lowers[probe.lowers as usize..]) {
+            let mut mask = kernel::below(lower, probe.within * probe.within * ROUNDING);
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                if eight[lane] != probe.guess {
+                    looks.push(look(search, probe, index as u32, eight[lane]));
+                }
+            }
+        }
+    }
+}
+
+/// Covers the rounding of squares in single precision.
+const ROUNDING: f32 = 1.0 + 1e-6;
+
+/// Distances of a probe to the triangles of a leaf; lowers the bound of its least distance.
+#[inline(always)]
+fn look(search: &Search<'_>, probe: &mut Probe, index: u32, leaf: u32) -> Look {
+    let block = &search.other.blocks[leaf as usize];
+    let local = [0, 1, 2].map(|k| (probe.point[k] - f64::from(block.origin[k])) as f32);
+    let squared = kernel::point_triangles(local, block);
+    let error = block.error + search.error;
+    let nearest = kernel::least(&squared).sqrt() + error;
+    probe.within = if nearest < probe.within { nearest } else { probe.within };
+    Look { probe: index, leaf, error, squared }
+}
+
+/// Gives every probe the exact foot on the closest of the triangles that may be the closest (usually one), the first of equals:
+/// so the result does not depend on where it looked first.
+#[inline(always)]
+fn settle(search: &Search<'_>, scratch: &mut Scratch) {
+    for look in &scratch.looks {
+        let probe = &mut scratch.probes[look.probe as usize];
+        let reach = probe.within + look.error;
+        let own = &search.other.leaves[look.leaf as usize];
+        let mut mask = kernel::at_most(&look.squared, reach * reach * ROUNDING) & ((1 << own.triangles) - 1);
+        while mask != 0 {
+            let triangle = own.first_triangle + mask.trailing_zeros();
+            mask &= mask - 1;
+            let foot = feature::foot(probe.point, triangle, search.other);
+            let distance = foot.signed_distance.abs();
+            let closer = probe.best.is_none_or(|(other, held)| {
+                let held = held.signed_distance.abs();
+                distance < held || (distance == held && triangle < other)
+            });
+            if closer && distance < search.tolerance {
+                probe.best = Some((triangle, foot));
+            }
+        }
+    }
 }
 
 /// The contact of a vertex of the body with its foot on the obstacle, both in the obstacle's frame.

@@ -2,7 +2,7 @@
 
 use super::Pair;
 use super::kernel::{self, Box32};
-use crate::surface::{EMPTY, LANES, LEAF, Leaf, Node, Surface, TriangleBlock};
+use crate::surface::{EMPTY, LANES, LEAF, Leaf, Node, Surface};
 use crate::vector::{Rigid, Vec3, norm};
 
 /// A leaf with the leaves of the other surface that come close to it, a range of a list.
@@ -50,7 +50,6 @@ pub(super) fn walk(pair: Pair<'_>, reach: f64, walk: &mut Walk) {
         return;
     }
     let margin = (reach + pair.slack()) as f32;
-    let mut block = TriangleBlock::ZERO;
     walk.candidates.push(0);
     walk.stack.push(Frame { node: 0, begin: 0, end: 1 });
     while let Some(frame) = walk.stack.pop() {
@@ -71,7 +70,7 @@ pub(super) fn walk(pair: Pair<'_>, reach: f64, walk: &mut Walk) {
             if child & LEAF == 0 {
                 walk.stack.push(Frame { node: child, begin, end });
             } else {
-                meet_leaf(pair, walk, child & !LEAF, begin as usize, margin, &mut block);
+                meet_leaf(pair, walk, child & !LEAF, begin as usize, margin);
                 walk.candidates.truncate(begin as usize);
             }
         }
@@ -118,17 +117,9 @@ fn child_extent(node: &Node, lane: usize) -> f32 {
 
 /// Keeps the candidates that may come within the margin of a leaf of the body.
 #[inline(always)]
-fn meet_leaf(
-    pair: Pair<'_>,
-    walk: &mut Walk,
-    index: u32,
-    begin: usize,
-    margin: f32,
-    block: &mut TriangleBlock,
-) {
+fn meet_leaf(pair: Pair<'_>, walk: &mut Walk, index: u32, begin: usize, margin: f32) {
     let leaf = &pair.body.leaves[index as usize];
-    kernel::moved_block(&pair.body.blocks[index as usize], pair.motion, block);
-    let grown = block_box(block, margin);
+    let grown = kernel::moved_block_box(&pair.body.blocks[index as usize], pair.motion, margin);
     let slab = Slab::of(leaf, pair.motion);
     let first = walk.body.near.len() as u32;
     for i in begin..walk.candidates.len() {
@@ -206,27 +197,6 @@ impl Slab {
         }
         center - half > self.high || center + half < self.low
     }
-}
-
-/// The box around a block, grown by `margin` and then rounded outward.
-#[inline(always)]
-fn block_box(block: &TriangleBlock, margin: f32) -> Box32 {
-    let mut result = Box32 { min: [0.0; 3], max: [0.0; 3] };
-    for axis in 0..3 {
-        let mut low = [0.0; LANES];
-        let mut high = [0.0; LANES];
-        for l in 0..LANES {
-            let (c, e, f) = (block.corner[axis][l], block.edge1[axis][l], block.edge2[axis][l]);
-            let (a, b) = (e.min(f), e.max(f));
-            low[l] = c + if a < 0.0 { a } else { 0.0 };
-            high[l] = c + if b > 0.0 { b } else { 0.0 };
-        }
-        let low = low.iter().fold(f64::INFINITY, |m, &v| if v < m { v } else { m });
-        let high = high.iter().fold(f64::NEG_INFINITY, |m, &v| if v > m { v } else { m });
-        result.min[axis] = low as f32 - margin;
-        result.max[axis] = high as f32 + margin;
-    }
-    result
 }
 
 /// Greatest distance between the places of any point of a body under two motions; `root` is the first node of its tree.

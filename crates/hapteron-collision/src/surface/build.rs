@@ -1,7 +1,7 @@
 //! Building a [`Surface`]: order the triangles into leaves of eight, renumber everything in that order, collapse the
 //! binary tree into an eight-wide one.
 
-use super::{EMPTY, Edge, EdgeKind, LANES, LEAF, Leaf, Node, Surface, TriangleBlock, topology};
+use super::{Cone, EMPTY, Edge, EdgeKind, LANES, LEAF, Leaf, Node, Surface, TriangleBlock, topology};
 use crate::vector::{Vec3, add, cross, dot, norm, sub, unit_or_zero};
 
 /// An axis-aligned box.
@@ -178,6 +178,7 @@ fn renumber(surface: &mut Surface, builder: &Builder) {
             normal,
             low,
             high,
+            ridge_cone: ridge_cone(surface, edge_order[first_edge..].iter().filter(|&&e| ridge(e))),
             first_triangle: branch.begin as u32,
             first_vertex: first_vertex as u32,
             first_edge: first_edge as u32,
@@ -204,7 +205,7 @@ fn renumber(surface: &mut Surface, builder: &Builder) {
         *vertices = vertices.map(|v| new_vertex[v as usize]);
         *triangles = triangles.map(|t| new_triangle[t as usize]);
     }
-    surface.blocks = surface.leaves.iter().map(|leaf| block(surface, leaf)).collect();
+    surface.blocks = surface.leaves.iter().map(|leaf| TriangleBlock::new(surface, leaf)).collect();
 }
 
 /// The mean normal of some triangles and the heights along it between which they lie.
@@ -220,6 +221,20 @@ fn slab(surface: &Surface, triangles: &[u32]) -> ([f32; 3], f32, f32) {
     let (low, high) =
         heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
     (normal, below(low), above(high))
+}
+
+/// A cone around the normal cones of some edges.
+fn ridge_cone<'a>(surface: &Surface, edges: impl Iterator<Item = &'a u32> + Clone) -> Cone {
+    let normal = |e: &u32| surface.edges[*e as usize].normal.map(f64::from);
+    let axis = unit_or_zero(edges.clone().fold([0.0; 3], |sum, e| add(sum, normal(e))));
+    let cos = edges.fold(1.0f64, |least, e| {
+        let own = f64::from(surface.edges[*e as usize].cone);
+        let leaning = dot(normal(e), axis).clamp(-1.0, 1.0);
+        let sines = ((1.0 - own * own) * (1.0 - leaning * leaning)).max(0.0).sqrt();
+        // The cosine of the sum of the two angles, unless that is more than a straight one.
+        least.min(if own + leaning <= 0.0 { -1.0 } else { own * leaning - sines })
+    });
+    Cone::wide(axis.map(|c| c as f32), if axis == [0.0; 3] { -1.0 } else { cos as f32 })
 }
 
 fn take(items: &[u32; 3], taken: &mut [bool], order: &mut Vec<u32>) {
@@ -240,22 +255,6 @@ fn inverse(order: &[u32], count: usize) -> Vec<u32> {
 
 fn pick<T: Copy>(list: &[T], order: &[u32]) -> Vec<T> {
     order.iter().map(|&i| list[i as usize]).collect()
-}
-
-/// The triangles of a leaf as arrays; the lanes that it does not fill repeat its first triangle.
-fn block(surface: &Surface, leaf: &Leaf) -> TriangleBlock {
-    let mut block = TriangleBlock::ZERO;
-    for lane in 0..LANES {
-        let own = if lane < leaf.triangles as usize { lane } else { 0 };
-        let [a, b, c] =
-            surface.triangles[leaf.first_triangle as usize + own].map(|v| surface.vertices[v as usize]);
-        for axis in 0..3 {
-            block.corner[axis][lane] = a[axis];
-            block.edge1[axis][lane] = b[axis] - a[axis];
-            block.edge2[axis][lane] = c[axis] - a[axis];
-        }
-    }
-    block
 }
 
 /// The binary tree with up to eight descendants of each kept branch as its children, largest opened first.

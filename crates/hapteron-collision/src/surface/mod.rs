@@ -1,8 +1,11 @@
 //! The frozen query structure of one mesh: triangles in blocks of eight, shared vertices and edges with their
 //! normals, and a flat eight-wide tree of boxes over the blocks. Built once, then never changed.
 
+mod block;
 mod build;
 mod topology;
+
+pub(crate) use block::{ERROR, TriangleBlock};
 
 use crate::mesh::TriMesh;
 
@@ -53,18 +56,39 @@ impl VertexNormal {
     pub const OPEN: f32 = -2.0;
 }
 
-/// Up to eight triangles as structure of arrays: a corner and the two edges from it, by axis and lane.
-#[derive(Clone, Debug)]
-#[repr(align(64))]
-pub(crate) struct TriangleBlock {
-    pub corner: [[f64; LANES]; 3],
-    pub edge1: [[f64; LANES]; 3],
-    pub edge2: [[f64; LANES]; 3],
+/// All unit directions within an angle of an axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cone {
+    pub axis: [f32; 3],
+    /// Cosine and sine of the angle.
+    pub cos: f32,
+    pub sin: f32,
 }
 
-impl TriangleBlock {
-    pub(crate) const ZERO: Self =
-        Self { corner: [[0.0; LANES]; 3], edge1: [[0.0; LANES]; 3], edge2: [[0.0; LANES]; 3] };
+impl Cone {
+    /// Widens the angle (in its cosine): more than what single precision loses, and as much as a contact of two edges may lean out.
+    pub const SLACK: f32 = 1e-4;
+
+    /// The cone around a unit vector with (almost) this cosine, on the safe side.
+    #[inline(always)]
+    pub(crate) fn wide(axis: [f32; 3], cos: f32) -> Self {
+        let cos = (cos - 1.5 * Self::SLACK).max(-1.0);
+        Self { axis, cos, sin: (1.0 - cos * cos).max(0.0).sqrt() }
+    }
+
+    /// True when some direction of this cone may be opposite to one of the other.
+    #[inline(always)]
+    pub(crate) fn faces_cone(&self, other: &Self) -> bool {
+        let aligned = (0..3).map(|k| self.axis[k] * other.axis[k]).sum();
+        self.faces(other.cos, other.sin, aligned)
+    }
+
+    /// The same for a cone of this cosine and sine; `aligned` is the cosine between the axes.
+    #[inline(always)]
+    pub(crate) fn faces(&self, other_cos: f32, other_sin: f32, aligned: f32) -> bool {
+        // The angle between one axis and the reverse of the other is at most the sum of the angles.
+        (self.cos + other_cos <= 0.0) | (aligned <= self.sin * other_sin - self.cos * other_cos + Self::SLACK)
+    }
 }
 
 /// One leaf: a block of triangles with the vertices and edges that it owns (each belongs to one leaf).
@@ -76,6 +100,8 @@ pub(crate) struct Leaf {
     pub normal: [f32; 3],
     pub low: f32,
     pub high: f32,
+    /// Directions along which the leaf's ridges can touch something.
+    pub ridge_cone: Cone,
     pub first_triangle: u32,
     pub first_vertex: u32,
     pub first_edge: u32,
