@@ -5,7 +5,8 @@ use hapteron::device::simulated::{DeviceModel, SimulatedDevice, SimulatedSetting
 use hapteron::device::{Device, DeviceSample, HandParameters, Scaling};
 use hapteron::dynamics::{ContactPlane, Coupling, Method, RigidBody, Spring, State};
 use hapteron::scene::ContactModel;
-use hapteron::session::{ContactSnapshot, HapticState, Settings, Tick, tick};
+use hapteron::session::grasp::Buttons;
+use hapteron::session::{ContactLaw, ContactSnapshot, HapticState, Settings, Tick, tick};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// Seconds.
@@ -67,6 +68,10 @@ impl Tool {
             time_step: DT,
             scaling: Scaling::new(1.0).unwrap(),
             contact_model: ContactModel::Planes,
+            // The walls are made here, not by passes; nothing is switched.
+            contact_law: ContactLaw { stiffness: 0.0, damping: 0.0 },
+            buttons: Buttons::default(),
+            blend_time: 0.1,
         }
     }
 }
