@@ -4,6 +4,7 @@ use crate::progress;
 use anyhow::{Result, bail};
 use hapteron::scene::Scene;
 use hapteron::scenes;
+use hapteron::session::Flags;
 use hapteron::session::real_time::{
     RealTime, RealTimeOptions, SceneDevice, TickRecord, Told, clock, system::resident_bytes,
 };
@@ -63,9 +64,11 @@ pub fn soak(seconds: f64, json: bool) -> Result<ExitCode> {
     let started = clock::now_ns();
     let mut cycles: Vec<Cycle> = Vec::with_capacity((seconds / cycle_time) as usize + 2);
     let mut last_time = 0.0;
+    let mut fault: Option<(f64, Flags)> = None;
     let mut seen_at = started;
     let bar = progress::bar(seconds as u64, "soak");
-    while !running.is_over() && !progress::interrupted() {
+    // After a fault there is no force, and nothing to be compared.
+    while !running.is_over() && !progress::interrupted() && fault.is_none() {
         std::thread::sleep(Duration::from_millis(50));
         running.drain(&mut |told| {
             if let Told::Tick(record) = told {
@@ -77,6 +80,9 @@ pub fn soak(seconds: f64, json: bool) -> Result<ExitCode> {
                     }
                 }
                 cycles[index].add(record);
+                if record.result.flags.no_force() && fault.is_none() {
+                    fault = Some((record.time, record.result.flags));
+                }
                 last_time = record.time;
             }
         });
@@ -88,6 +94,15 @@ pub fn soak(seconds: f64, json: bool) -> Result<ExitCode> {
     let finished = running.stop();
     if !finished.end.is_regular() {
         bail!("the session ended early: {}", finished.end);
+    }
+    if let Some((time, flags)) = fault {
+        let timing = finished.timing;
+        bail!(
+            "a fault took the force away at {time:.3} s: {}; {} deadlines missed until then, contacts up to {:.0} ms old",
+            flags.names().collect::<Vec<_>>().join(", "),
+            timing.missed,
+            timing.contact_age.greatest_ns as f64 * 1e-6
+        );
     }
     // Whole cycles only; the first one warms up.
     cycles.truncate((last_time / cycle_time + 0.01) as usize);

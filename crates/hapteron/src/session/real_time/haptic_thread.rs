@@ -11,6 +11,10 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+/// A state is there so long after its deadline. The contact thread's timer must not go off at the deadline itself: its interrupt would delay
+/// the very tick that it waits for.
+const SETTLE_NS: u64 = 40_000;
+
 /// Called before every tick with its number, on the haptic thread: where tests make trouble.
 pub type TickHook = Box<dyn FnMut(u64) + Send>;
 
@@ -221,7 +225,7 @@ impl Loop {
             body: self.settings.body,
             law: self.haptic.grip.contact_law(&self.settings.contact_law),
             model: self.settings.contact_model,
-            next_ns: instant.started_ns.saturating_sub(instant.lateness_ns) + self.period_ns,
+            next_ns: instant.started_ns.saturating_sub(instant.lateness_ns) + self.period_ns + SETTLE_NS,
         });
         let record = TickRecord {
             tick: self.ticks,

@@ -6,8 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// Between two looks.
-const LOOK: Duration = Duration::from_millis(2);
+/// Between two looks; away from whole milliseconds and from the haptic thread's deadlines ([`clock::quiet_epoch`]), which a timer at the same time would
+/// delay.
+const LOOK_NS: u64 = 2_000_000;
+const PHASE_NS: u64 = 500_000;
 
 /// Watches until the haptic thread has ended. Answers whether it had to stop the device.
 pub(super) fn watch(shared: &Arc<Shared>, device: &Arc<SharedDevice>, watchdog: Duration) -> bool {
@@ -15,7 +17,7 @@ pub(super) fn watch(shared: &Arc<Shared>, device: &Arc<SharedDevice>, watchdog: 
     let mut taken_over = false;
     loop {
         let now = clock::now_ns();
-        clock::sleep_until(now + LOOK.as_nanos() as u64);
+        clock::sleep_until((now / LOOK_NS + 1) * LOOK_NS + PHASE_NS);
         if shared.is_haptic_done() {
             return taken_over;
         }

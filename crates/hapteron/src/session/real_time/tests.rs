@@ -128,7 +128,7 @@ fn records_that_nobody_drains_are_counted() {
 }
 
 /// Would catch a torn or stale value between the threads: a writer and a reader as fast as they can. (Under ThreadSanitizer it also catches a data
-/// race: see docs/testing.md.)
+/// race: see docs/real-time.md.)
 #[test]
 fn snapshots_and_states_cross_whole_and_in_order() {
     let scene = Arc::new(Scene::from_file(spoon_in_cup(0.01, 2e3, Method::BackwardEuler)).unwrap());
