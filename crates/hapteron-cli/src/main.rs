@@ -24,6 +24,7 @@ fn main() -> ExitCode {
         Command::Compare(a) => commands::compare::compare(&a),
         Command::Bench(a) => commands::bench::bench(&a),
         Command::Models(a) => commands::models::models(&a),
+        Command::Live(a) => commands::live::live(&a),
     };
     match outcome {
         Ok(code) => code,

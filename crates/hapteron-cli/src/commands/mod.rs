@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod compare;
 pub mod demo;
+pub mod live;
 pub mod mesh;
 pub mod models;
 pub mod query;
