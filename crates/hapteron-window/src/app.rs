@@ -220,6 +220,9 @@ impl eframe::App for Window {
             Some(n) => self.picture_in = Some(n - 1),
             None => {}
         }
+        if ctx.input(|i| i.modifiers.command && i.key_pressed(egui::Key::Q)) {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
         self.show_notices(&ctx);
         self.widgets.finish(ctx.pixels_per_point());
         self.follow_plan(&ctx);

@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Everything that is waited for comes within this, on a machine that does other things too.
-const PATIENCE: Duration = Duration::from_secs(90);
+const PATIENCE: Duration = Duration::from_secs(60);
 const STEP: Duration = Duration::from_millis(100);
 
 /// Closes everything when it is dropped.
@@ -124,7 +124,9 @@ impl Desk {
             if let Some(status) = self.window.try_wait().unwrap() {
                 panic!("the window has ended while '{name}' was waited for: {status}");
             }
-            assert!(begun.elapsed() < PATIENCE, "'{name}' does not appear");
+            if begun.elapsed() > PATIENCE {
+                panic!("'{name}' does not appear; see {}", self.keep_picture().display());
+            }
             std::thread::sleep(STEP);
         }
     }
@@ -140,7 +142,9 @@ impl Desk {
             if size > 0 && size == before {
                 return;
             }
-            assert!(begun.elapsed() < PATIENCE, "{name} is not written");
+            if begun.elapsed() > PATIENCE {
+                panic!("{name} is not written; see {}", self.keep_picture().display());
+            }
             before = size;
             std::thread::sleep(5 * STEP);
         }
@@ -212,11 +216,16 @@ impl Desk {
         Picture::from_xwd(&std::fs::read(self.folder.join("Xvfb_screen0")).unwrap())
     }
 
-    /// Closes the window as its frame would, and sees that it ends well.
+    /// The display as it is, for whoever looks for what went wrong.
+    fn keep_picture(&self) -> PathBuf {
+        let path = std::env::temp_dir().join("hapteron-live-failed.png");
+        self.picture().write_png(&path);
+        path
+    }
+
+    /// Closes the window, and sees that it ends well.
     pub fn close(mut self) {
-        let found = self.xdotool(&["search", "--onlyvisible", "--name", "hapteron"]);
-        let window = found.lines().next().unwrap().to_owned();
-        self.xdotool(&["windowquit", &window]);
+        self.key("ctrl+q");
         let begun = Instant::now();
         let status = loop {
             if let Some(status) = self.window.try_wait().unwrap() {

@@ -52,7 +52,8 @@ impl Picture {
         Self { width: info.width as usize, height: info.height as usize, pixels }
     }
 
-    fn write_png(&self, path: &Path) {
+    /// Saves it.
+    pub fn write_png(&self, path: &Path) {
         let file = std::fs::File::create(path).unwrap();
         let mut encoder =
             png::Encoder::new(std::io::BufWriter::new(file), self.width as u32, self.height as u32);
