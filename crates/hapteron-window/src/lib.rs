@@ -70,7 +70,9 @@ pub fn open(options: Options) -> Result<(), WindowError> {
     .map_err(|error| {
         let why = match error {
             eframe::Error::WinitEventLoop(_) => "the display does not answer".to_owned(),
-            eframe::Error::NoGlutinConfigs(..) => "the display has no OpenGL (Debian: libgl1-mesa-dri)".to_owned(),
+            eframe::Error::NoGlutinConfigs(..) => {
+                "the display has no OpenGL (Debian: libgl1-mesa-dri)".to_owned()
+            }
             other => other.to_string(),
         };
         WindowError(format!("the window cannot be opened: {why}. {}", display::CURE))

@@ -1,6 +1,7 @@
 //! Reading a scene beside the window, so that the window goes on.
 
 use crate::live::Opened;
+use crate::live::hand::capabilities;
 use crate::view;
 use hapteron::collision::mesh;
 use hapteron::scene::file::{Body, Hand, Obstacle};
@@ -89,6 +90,9 @@ pub fn read(source: &Source) -> Result<Opened, String> {
             Scene::from_file(file).map_err(|e| e.to_string())
         })?,
     };
+    let mut scene = scene;
+    let guard = scene.guard_for(&capabilities()).map_err(|e| e.to_string())?;
+    scene.guard = guard.map(|g| *g.settings());
     let shapes = view::shapes(&scene);
     Ok(Opened { scene: Arc::new(scene), shapes })
 }

@@ -308,7 +308,7 @@ impl Recording {
                 })?;
             }
             let row = Row::from_numbers(&numbers);
-            if row.flags.contains(Flags::FAULT_LATCHED) && recording.fault_time.is_none() {
+            if row.flags.no_force() && recording.fault_time.is_none() {
                 recording.fault_time = Some(row.time);
             }
             recording.rows.push(row);

@@ -226,7 +226,7 @@ fn sessions_of_every_pacing_come_again_bit_for_bit() {
         recorded.log.write_csv(&mut bytes).unwrap();
         let log = Log::read_csv(&bytes, "device.csv", &scene).unwrap();
         assert_eq!(log, recorded.log, "the log reads back differently");
-        let again = replay(&scene, &log, &mut |_| true);
+        let again = replay(&scene, &log, &mut |_| true).unwrap();
         assert!(csv(&again) == csv(&recorded.recording), "{pacing:?}: made again it is different");
     }
 }
@@ -376,7 +376,7 @@ fn a_contact_thread_that_freezes_or_crawls_is_seen_and_felt_little() {
         assert!(summary.stable && summary.greatest_force < 8.0, "{what}: {summary:?}");
         assert!(summary.greatest_contact_age >= least_age, "{what}: {} s", summary.greatest_contact_age);
         assert!(summary.in_contact > 0.2, "{what}: {}", summary.in_contact);
-        let again = replay(&scene, &recorded.log, &mut |_| true);
+        let again = replay(&scene, &recorded.log, &mut |_| true).unwrap();
         assert!(csv(&again) == csv(&recorded.recording), "{what}: made again it is different");
     }
 }

@@ -83,7 +83,7 @@ fn replay_into(scene: &Scene, path: &Path, folder: &Path) -> Result<ExitCode> {
     let recording = replay(scene, &log, &mut |share| {
         bar.set_position((share * 1000.0) as u64);
         !progress::interrupted()
-    });
+    })?;
     bar.finish_and_clear();
     let wall = started.elapsed().as_secs_f64();
     let outcome = Outcome { scene, recording: &recording, time: Time::Virtual { wall, replayed: true } };

@@ -6,7 +6,8 @@
 //! stands still.
 
 use hapteron::device::{
-    Applied, Capabilities, Device, DeviceCommand, DeviceFault, DeviceSample, Hand, HandParameters, Pacing,
+    Applied, Capabilities, Device, DeviceCommand, DeviceFault, DeviceSample, GRIP_RADIUS, HandParameters,
+    Pacing,
 };
 use hapteron::trajectory::Trajectory;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -130,16 +131,19 @@ impl WindowHand {
     }
 }
 
-fn capabilities() -> Capabilities {
+/// What the window's hand is to a guard.
+#[must_use]
+pub fn capabilities() -> Capabilities {
     Capabilities {
         name: "mouse and keyboard".to_owned(),
         senses_rotation: true,
         drives_force: true,
         drives_torque: true,
-        peak_force: f64::INFINITY,
-        continuous_force: f64::INFINITY,
-        peak_torque: f64::INFINITY,
-        continuous_torque: f64::INFINITY,
+        // As of a strong desktop device: what the arrows show is what such a one would do.
+        peak_force: 40.0,
+        continuous_force: 40.0,
+        peak_torque: 2.0,
+        continuous_torque: 2.0,
         max_stiffness: f64::INFINITY,
         max_angular_stiffness: f64::INFINITY,
         max_damping: f64::INFINITY,
@@ -195,10 +199,44 @@ impl Device for WindowHand {
     }
 }
 
+/// A mass on a spring and damper that follows a goal and is pushed by the device.
+#[derive(Clone, Copy, Debug)]
+struct Follower {
+    parameters: HandParameters,
+    sample: DeviceSample,
+}
+
+impl Follower {
+    /// Moves on by `dt` while the device pushes with a held force.
+    ///
+    /// Implicit Euler on each axis, stable for any impedance; the turn towards the goal is small within one step. Real time: constant work.
+    fn advance(&mut self, goal: &DeviceSample, command: &DeviceCommand, dt: f64) -> DeviceSample {
+        let HandParameters { mass, damping, stiffness } = self.parameters;
+        let whole = mass + dt * damping + dt * dt * stiffness;
+        let pull = (goal.position - self.sample.position) * stiffness
+            + goal.linear_velocity * damping
+            + command.force;
+        let v = (self.sample.linear_velocity * mass + pull * dt) / whole;
+        let r2 = GRIP_RADIUS * GRIP_RADIUS;
+        let turn = (goal.orientation * self.sample.orientation.inverse()).scaled_axis();
+        let twist = turn * (stiffness * r2) + goal.angular_velocity * (damping * r2) + command.torque;
+        let omega = (self.sample.angular_velocity * (mass * r2) + twist * dt) / (whole * r2);
+        let finite = |v: &Vector3<f64>| v.iter().all(|c| c.is_finite());
+        if finite(&v) && finite(&omega) {
+            self.sample.position += v * dt;
+            self.sample.orientation = UnitQuaternion::from_scaled_axis(omega * dt) * self.sample.orientation;
+            self.sample.linear_velocity = v;
+            self.sample.angular_velocity = omega;
+        }
+        self.sample.time = goal.time;
+        self.sample
+    }
+}
+
 /// Moves the handle, without a clock of its own. Real time: constant work but for the search in the motion, no allocation.
 struct Mover {
     sample: DeviceSample,
-    hand: Option<Hand>,
+    hand: Follower,
     hold: Hold,
     /// Where the goal is.
     goal: Isometry3<f64>,
@@ -215,7 +253,7 @@ impl Mover {
         let sample = standing(&wish.pose, 0.0);
         Self {
             sample,
-            hand: Hand::new(wish.hold.parameters(), &sample).ok(),
+            hand: Follower { parameters: wish.hold.parameters(), sample },
             hold: wish.hold,
             goal: wish.pose,
             source: wish.source,
@@ -250,19 +288,20 @@ impl Mover {
         let goal = self.goal_at(wish, motion, now, dt);
         if wish.hold != self.hold {
             self.hold = wish.hold;
-            self.hand = Hand::new(self.hold.parameters(), &self.sample).ok();
+            self.hand = Follower { parameters: self.hold.parameters(), sample: self.sample };
         }
         let exactly = self.hold == Hold::Exact && self.source == Source::Motion;
         let held = DeviceCommand::zero();
         let command = if self.hold == Hold::Exact { &held } else { command };
-        self.sample = match &mut self.hand {
-            Some(hand) if dt > 0.0 => hand.advance(&goal, command, dt),
-            _ => DeviceSample { time: now, ..self.sample },
+        self.sample = if dt > 0.0 {
+            self.hand.advance(&goal, command, dt)
+        } else {
+            DeviceSample { time: now, ..self.sample }
         };
         if exactly && dt > 0.0 {
             // A recorded hand is followed as it was, and the simulated one stays with it for when it takes over.
             self.sample = goal;
-            self.hand = Hand::new(self.hold.parameters(), &goal).ok();
+            self.hand.sample = goal;
         }
         self.sample
     }

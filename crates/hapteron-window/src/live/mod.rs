@@ -72,6 +72,8 @@ pub struct Live {
     hold: Hold,
     source: Source,
     repeat: bool,
+    /// Kind of the driver whose device is the hand; none: the window.
+    device: Option<&'static str>,
     steering: Steering,
     camera: Camera,
     hovered: bool,
@@ -119,6 +121,7 @@ impl Live {
             hold: Hold::Exact,
             source: Source::Pointer,
             repeat: true,
+            device: None,
             camera: Camera::framing(center, radius, Preset::Oblique),
             hovered: false,
             paused: false,
@@ -242,11 +245,21 @@ impl Live {
         }
     }
 
-    /// Another session in place of this one.
+    /// The scene from its start again, with another device, or with the pointer.
+    fn switch_device(&mut self, kind: Option<&'static str>) {
+        self.device = kind;
+        self.start_again();
+    }
+
+    /// Another session in place of this one. A replay is always the window's own hand.
     fn run(&mut self, scene: Scene, play: bool) {
         self.session.stop();
         let scene = Arc::new(scene);
-        match Session::start(Arc::clone(&scene), self.hold, play) {
+        let started = match self.device.filter(|_| !play) {
+            Some(kind) => Session::start_device(Arc::clone(&scene), kind),
+            None => Session::start(Arc::clone(&scene), self.hold, play),
+        };
+        match started {
             Ok(session) => {
                 self.session = session;
                 self.told = self.values;
@@ -257,7 +270,10 @@ impl Live {
                 self.plots.restart();
                 self.past.time = None;
             }
-            Err(problem) => self.complain(format!("Cannot start: {problem}")),
+            Err(problem) => {
+                self.device = None;
+                self.complain(format!("Cannot start: {problem}"));
+            }
         }
     }
 

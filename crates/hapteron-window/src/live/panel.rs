@@ -10,6 +10,9 @@ use egui::{Button, CollapsingHeader, ComboBox, Grid, RichText, Slider};
 use hapteron::session::Command;
 use std::ops::RangeInclusive;
 
+/// The device that is none.
+const POINTER: &str = "mouse and keyboard";
+
 /// A number with its unit.
 struct Number {
     name: &'static str,
@@ -140,6 +143,27 @@ impl Live {
                 self.send(Command::Pause(!self.paused));
             }
         });
+        ui.horizontal(|ui| {
+            ui.label("Device");
+            let shown = self.session.driver().or(self.device).unwrap_or(POINTER).to_owned();
+            let mut chosen = None;
+            ComboBox::from_id_salt("device").width(190.0).selected_text(shown).show_ui(ui, |ui| {
+                if ui.selectable_label(self.device.is_none(), POINTER).clicked() {
+                    chosen = Some(None);
+                }
+                for kind in hapteron::device::drivers::kinds() {
+                    if ui.selectable_label(self.device == Some(kind), kind).clicked() {
+                        chosen = Some(Some(kind));
+                    }
+                }
+            });
+            if let Some(kind) = chosen.filter(|kind| *kind != self.device) {
+                self.switch_device(kind);
+            }
+        });
+        if self.session.driver().is_some() {
+            return;
+        }
         ui.horizontal(|ui| {
             ui.label("Moved by");
             let pointer = Button::selectable(self.source == Source::Pointer, "pointer");

@@ -5,10 +5,11 @@ use super::history::History;
 use super::recorder::Recorder;
 use super::values::Values;
 use crate::view::Spot;
+use hapteron::device::drivers::{self, DriverOptions, OpenError};
 use hapteron::device::{Device, Scaling};
 use hapteron::dynamics::{ContactPlane, RigidBody};
 use hapteron::recording::Row;
-use hapteron::scene::Scene;
+use hapteron::scene::{Scene, SceneError};
 use hapteron::session::real_time::{
     End, Grants, PassRecord, RealTime, RealTimeOptions, Running, StartError, TickRecord, Timing, Told,
 };
@@ -29,9 +30,12 @@ pub enum SessionError {
     /// The motion of the hand.
     #[error("{0}")]
     Motion(#[from] TrajectoryError),
-    /// A value.
+    /// The device cannot be opened.
     #[error("{0}")]
-    Value(#[from] CommandError),
+    Driver(#[from] OpenError),
+    /// The guard.
+    #[error("{0}")]
+    Guard(#[from] SceneError),
 }
 
 /// How the device's workspace lies in the world, as the session has put it.
@@ -53,6 +57,8 @@ pub struct Session {
     index: Index,
     /// Length of the motion that the hand can make, seconds.
     motion: f64,
+    /// The device's name, when it is not the window's hand.
+    driver: Option<String>,
     latest: Option<TickRecord>,
     /// As its mass has been set.
     body: RigidBody,
@@ -70,21 +76,38 @@ impl Session {
     /// # Errors
     /// [`SessionError`].
     pub fn start(scene: Arc<Scene>, hold: Hold, play: bool) -> Result<Self, SessionError> {
-        let first = scene.scaling.from_world(&scene.trajectory.sample(0.0, scene.time_step));
-        let wish = Wish {
-            pose: Isometry3::from_parts(first.position.into(), first.orientation),
-            source: if play { Source::Motion } else { Source::Pointer },
-            hold,
-            start: 0,
-            repeat: false,
-        };
+        let wish = first_wish(&scene, hold, play);
         let motion = in_device_scale(&scene.trajectory, scale_of(&scene))?;
         let (control, device) = WindowHand::new(wish, Some(motion));
-        let device: Box<dyn Device> = Box::new(device);
+        Self::launch(scene, Box::new(device), control, wish, None)
+    }
+
+    /// Starts a scene with a real device, or one without motors that a driver opens. Set-up: may take seconds.
+    ///
+    /// # Errors
+    /// [`SessionError`].
+    pub fn start_device(scene: Arc<Scene>, kind: &str) -> Result<Self, SessionError> {
+        let device = drivers::open(kind, &DriverOptions::new())?;
+        let mut scene = Scene::clone(&scene);
+        scene.guard = scene.guard_for(device.capabilities())?.map(|g| *g.settings());
+        let name = device.capabilities().name.clone();
+        let wish = first_wish(&scene, Hold::Exact, false);
+        // No one listens to the control of a hand that is not the device.
+        let (control, _) = WindowHand::new(wish, None);
+        Self::launch(Arc::new(scene), device, control, wish, Some(name))
+    }
+
+    fn launch(
+        scene: Arc<Scene>,
+        device: Box<dyn Device>,
+        control: HandControl,
+        wish: Wish,
+        driver: Option<String>,
+    ) -> Result<Self, SessionError> {
         let mut options = RealTimeOptions::of(&scene);
         options.room = ROOM;
-        // The hand begins where the scene says that the handle is.
-        options.attach = false;
+        // The window's hand begins where the scene says that the handle is; another device is put there.
+        options.attach = driver.is_some();
         let running = RealTime::start(Arc::clone(&scene), device, options)?;
         let grants = running.grants().clone();
         let motion = scene.trajectory.duration();
@@ -100,6 +123,7 @@ impl Session {
             wish,
             index,
             motion,
+            driver,
             latest: None,
             body,
             spots: Vec::new(),
@@ -107,6 +131,12 @@ impl Session {
             grasp,
             held: true,
         })
+    }
+
+    /// The device's name, when it is not the window's hand.
+    #[must_use]
+    pub fn driver(&self) -> Option<&str> {
+        self.driver.as_deref()
     }
 
     /// Takes what has happened since the last picture.
@@ -261,6 +291,18 @@ impl Session {
     #[must_use]
     pub fn grants(&self) -> &Grants {
         &self.grants
+    }
+}
+
+/// The hand where the scene has it at the start.
+fn first_wish(scene: &Scene, hold: Hold, play: bool) -> Wish {
+    let first = scene.scaling.from_world(&scene.trajectory.sample(0.0, scene.time_step));
+    Wish {
+        pose: Isometry3::from_parts(first.position.into(), first.orientation),
+        source: if play { Source::Motion } else { Source::Pointer },
+        hold,
+        start: 0,
+        repeat: false,
     }
 }
 

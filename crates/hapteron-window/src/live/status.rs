@@ -57,8 +57,11 @@ impl Live {
                     let text = RichText::new(line);
                     ui.label(if index == 0 { text.strong() } else { text.small() });
                 }
-                let fault = self.session.latest().and_then(|r| r.result.after.fault);
-                if fault.is_some() && !over {
+                let faulty = self.session.latest().is_some_and(|r| {
+                    r.result.after.fault.is_some()
+                        || r.result.after.guard.is_some_and(|g| g.fault().is_some())
+                });
+                if faulty && !over {
                     let hint = "Forces on again, from where the body stands; first put right what caused it";
                     if widgets.add(ui, "re-arm", Button::new("Re-arm")).on_hover_text(hint).clicked() {
                         self.send(Command::Rearm);
@@ -79,6 +82,9 @@ impl Live {
             let mut words = vec!["No force: a fault has latched".to_owned()];
             words.extend(fault.names().map(str::to_owned));
             return (RED, words);
+        }
+        if let Some(fault) = record.result.after.guard.and_then(|g| g.fault()) {
+            return (RED, vec!["No force: the guard took it away".to_owned(), fault.to_string()]);
         }
         let flags = record.result.flags;
         let warnings: Vec<String> = flags

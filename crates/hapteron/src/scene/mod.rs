@@ -4,6 +4,7 @@
 //! meshes are loaded, what is missing is filled in, and [`Scene::to_toml`] gives back a file with every value written out, from which
 //! the same scene comes bit for bit. Set-up only; nothing here runs in the haptic tick.
 
+mod closed_loop;
 mod error;
 pub mod file;
 mod read;
@@ -17,7 +18,9 @@ use crate::trajectory::Trajectory;
 use error::Source;
 use hapteron_collision::Surface;
 use hapteron_collision::mesh::TriMesh;
-use hapteron_device::{DeviceSample, HandParameters, Scaling};
+use hapteron_device::guard::{Guard, GuardSettings};
+use hapteron_device::simulated::SimulatedSettings;
+use hapteron_device::{Capabilities, DeviceSample, HandParameters, Scaling};
 use hapteron_dynamics::{Coupling, Handle, Method, RigidBody, State};
 use nalgebra::{Isometry3, Vector3};
 use std::path::{Path, PathBuf};
@@ -94,6 +97,10 @@ pub struct Scene {
     pub trajectory: Trajectory,
     /// A simulated hand; without, the handle follows the trajectory exactly.
     pub hand: Option<HandParameters>,
+    /// The device that is simulated where there is a hand.
+    pub simulated: SimulatedSettings,
+    /// Its guard; none: switched off, or nobody feels the force.
+    pub guard: Option<GuardSettings>,
     /// The body at the start.
     pub start: State,
 }
@@ -166,6 +173,25 @@ impl Scene {
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.trajectory.duration()
+    }
+
+    /// A guard for a device, with the scene's limits where it has them; none: switched off.
+    ///
+    /// # Errors
+    /// A limit out of its range.
+    pub fn guard_for(&self, device: &Capabilities) -> Result<Option<Guard>, SceneError> {
+        let fault = |e: hapteron_device::guard::GuardError| SceneError {
+            file: self.name().to_owned(),
+            line: None,
+            key: Some(format!("guard.{}", e.0)),
+            problem: e.to_string(),
+        };
+        if self.file.guard.enabled == Some(false) {
+            return Ok(None);
+        }
+        Guard::new(closed_loop::guard_settings(&self.file.guard, device, self.time_step))
+            .map(Some)
+            .map_err(fault)
     }
 
     /// The pose of the body's mesh frame at a state.

@@ -4,12 +4,7 @@ use super::error::{SceneError, Source};
 use super::file::SceneFile;
 
 /// Keys of the specification that need what this version does not have yet.
-const LATER: [(&str, &str); 4] = [
-    (
-        "guard",
-        "the output guard comes with real devices; this version runs in virtual time. Remove the table",
-    ),
-    ("kind", "real devices are not available yet; this version runs in virtual time. Remove the key"),
+const LATER: [(&str, &str); 2] = [
     ("cpu", "it matters in real time only, which is not available yet. Remove the key"),
     ("priority", "it matters in real time only, which is not available yet. Remove the key"),
 ];
@@ -124,7 +119,7 @@ mod tests {
         assert!(fault(&format!("{BODY}[conact]\n"), &[]).contains("did you mean `contact`?"));
         let text = fault(&format!("{BODY}[integrator]\nmethod = \"runge-kuta-4\"\n"), &[]);
         assert!(text.contains("did you mean `runge-kutta-4`?"), "{text}");
-        assert!(fault(&format!("{BODY}[guard]\nmax_force = 3\n"), &[]).contains("virtual time"));
+        assert!(fault(&format!("{BODY}[contact_thread]\ncpu = 3\n"), &[]).contains("real time only"));
     }
 
     #[test]

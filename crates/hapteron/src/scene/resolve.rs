@@ -4,11 +4,12 @@ use super::error::{SceneError, Source};
 use super::file::{self, Anticipation, Auto, SceneFile};
 use super::{ContactModel, ContactSettings, Model, PlacedObstacle, Scene};
 use crate::session::grasp::Buttons;
+use crate::session::real_time::HAPTIC_PRIORITY;
 use crate::trajectory::Trajectory;
 use crate::{assets, motion};
 use hapteron_collision::Surface;
 use hapteron_collision::mesh::{self, TriMesh};
-use hapteron_device::{DeviceSample, HandParameters, Scaling};
+use hapteron_device::{DeviceSample, Scaling};
 use hapteron_dynamics::{Coupling, Method, RigidBody, Spring, State};
 use nalgebra::{Isometry3, Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::path::Path;
@@ -21,7 +22,7 @@ const CLUSTER_RADIUS: f64 = 0.15;
 /// A quaternion this close to unit length is used bit for bit.
 const EXACT_UNIT: f64 = 1e-14;
 
-type Resolved<T> = Result<T, SceneError>;
+pub(super) type Resolved<T> = Result<T, SceneError>;
 
 pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Resolved<Scene> {
     let resolver = Resolver { source, folder };
@@ -37,9 +38,10 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
     let scaling = file.device.position_scale.get_or_insert(1.0);
     let scaling = Scaling::new(*scaling).map_err(|e| source.fault("device.position_scale", e.to_string()))?;
     let buttons = resolver.buttons(&mut file.device)?;
-    let (trajectory, hand) = resolver.hand(&mut file.hand, time_step)?;
+    let trajectory = resolver.trajectory(&mut file.hand, time_step)?;
+    let closed = resolver.closed_loop(&mut file, time_step)?;
 
-    let handle = trajectory.sample(0.0, time_step);
+    let handle = closed.sensed(trajectory.sample(0.0, time_step));
     let coupling = resolver.coupling(&mut file, &handle, center_of_mass)?;
     let start = resolver.start(&mut file, &handle, &body, center_of_mass)?;
     let contact = resolver.contact(&mut file, &body, &model.surface, time_step)?;
@@ -63,18 +65,20 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
         scaling,
         buttons,
         trajectory,
-        hand,
+        hand: closed.hand,
+        simulated: closed.simulated,
+        guard: closed.guard,
         start,
     })
 }
 
-struct Resolver<'a> {
-    source: &'a Source,
+pub(super) struct Resolver<'a> {
+    pub(super) source: &'a Source,
     folder: &'a Path,
 }
 
 impl Resolver<'_> {
-    fn positive(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
+    pub(super) fn positive(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
         let v = *value.get_or_insert(default);
         if v > 0.0 && v.is_finite() {
             return Ok(v);
@@ -82,7 +86,7 @@ impl Resolver<'_> {
         Err(self.source.fault(key, format!("is {v}; it must be positive and finite")))
     }
 
-    fn not_negative(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
+    pub(super) fn not_negative(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
         let v = *value.get_or_insert(default);
         if v >= 0.0 && v.is_finite() {
             return Ok(v);
@@ -224,33 +228,20 @@ impl Resolver<'_> {
         Ok(Buttons { grasp, clutch })
     }
 
-    fn hand(&self, hand: &mut file::Hand, dt: f64) -> Resolved<(Trajectory, Option<HandParameters>)> {
+    fn trajectory(&self, hand: &mut file::Hand, dt: f64) -> Resolved<Trajectory> {
         let Some(name) = &mut hand.trajectory else {
             let text = "is missing: in virtual time the handle needs a motion. Give a CSV file (t,px,py,pz,qw,qx,qy,qz), `builtin:NAME`, or --replay FILE";
             return Err(self.source.fault("hand.trajectory", text));
         };
         let fault =
             |e: crate::trajectory::TrajectoryError| self.source.fault("hand.trajectory", e.to_string());
-        let trajectory = if let Some(builtin) = name.strip_prefix(BUILTIN) {
-            motion::builtin(builtin, dt).map_err(fault)?
+        if let Some(builtin) = name.strip_prefix(BUILTIN) {
+            motion::builtin(builtin, dt).map_err(fault)
         } else {
             let path = self.path(name);
             *name = path.clone();
-            Trajectory::load(path).map_err(fault)?
-        };
-        let parameters = match (hand.mass, hand.damping, hand.stiffness) {
-            (None, None, None) => None,
-            (Some(mass), Some(damping), Some(stiffness)) => Some(HandParameters { mass, damping, stiffness }),
-            _ => {
-                let text = "a simulated hand needs mass, damping and stiffness together; leave all three out for a handle that follows the motion exactly";
-                return Err(self.source.fault("hand.mass", text));
-            }
-        };
-        if let Some(parameters) = parameters {
-            hapteron_device::Hand::new(parameters, &trajectory.sample(0.0, dt))
-                .map_err(|e| self.source.fault("hand.mass", e.to_string()))?;
+            Trajectory::load(path).map_err(fault)
         }
-        Ok((trajectory, parameters))
     }
 
     /// The grasp is given, or recorded from where handle and body are at the start (section 5.1 of the paper).
@@ -356,6 +347,13 @@ impl Resolver<'_> {
             }
         };
         let thread = &mut file.contact_thread;
+        if let Some(priority) = thread.priority.filter(|p| !(1..HAPTIC_PRIORITY).contains(p)) {
+            let text = format!(
+                "is {priority}; it must be 1 to {}, below the haptic thread's. Leave it out for ordinary scheduling",
+                HAPTIC_PRIORITY - 1
+            );
+            return Err(self.source.fault("contact_thread.priority", text));
+        }
         Ok(ContactSettings {
             stiffness,
             damping,

@@ -182,9 +182,13 @@ pub fn apply(settings: &mut Settings, haptic: &mut HapticState, command: &Comman
             grip.switch();
         }
         Command::Rearm => {
-            if haptic.fault.take().is_some() {
+            let of_guard = haptic.guard.as_ref().is_some_and(|g| g.fault().is_some());
+            if haptic.fault.take().is_some() || of_guard {
                 haptic.stand_still();
                 haptic.grip.attach();
+                if let Some(guard) = &mut haptic.guard {
+                    guard.rearm();
+                }
             }
         }
         Command::Attach => grip.attach(),

@@ -2,11 +2,10 @@
 
 use super::log::Log;
 use super::real_time::depth;
-use super::{
-    Command, ContactPass, ContactSnapshot, Flags, HapticState, Settings, View, apply, handle_speed, tick,
-};
+use super::{Command, ContactPass, ContactSnapshot, HapticState, Settings, View, apply, handle_speed, tick};
 use crate::recording::{Recording, Row};
 use crate::scene::{Scene, handle_at};
+use hapteron_device::guard::{Guard, GuardError};
 use hapteron_dynamics::Handle;
 use std::collections::VecDeque;
 
@@ -15,9 +14,15 @@ use std::collections::VecDeque;
 /// With the scene of the log the recording has the same bits as the session's `run.csv`, if the log is complete. With another scene it tells what
 /// the same hand at the same times would have met: the device's samples do not follow the force, the schedule stays. `progress` as in
 /// [`super::run_virtual`].
-#[must_use]
-pub fn replay(scene: &Scene, log: &Log, progress: &mut dyn FnMut(f64) -> bool) -> Recording {
-    let mut session = Replay::new(scene, log);
+///
+/// # Errors
+/// A guard that cannot be (a scene that was read has been checked already).
+pub fn replay(
+    scene: &Scene,
+    log: &Log,
+    progress: &mut dyn FnMut(f64) -> bool,
+) -> Result<Recording, GuardError> {
+    let mut session = Replay::new(scene, log)?;
     let mut recording = Recording::new();
     recording.rows.reserve(log.rows.len());
     let report_every = (log.rows.len() / 100).max(1);
@@ -28,7 +33,7 @@ pub fn replay(scene: &Scene, log: &Log, progress: &mut dyn FnMut(f64) -> bool) -
             break;
         }
     }
-    recording
+    Ok(recording)
 }
 
 struct Replay<'a> {
@@ -45,12 +50,15 @@ struct Replay<'a> {
 }
 
 impl<'a> Replay<'a> {
-    fn new(scene: &'a Scene, log: &'a Log) -> Self {
+    fn new(scene: &'a Scene, log: &'a Log) -> Result<Self, GuardError> {
         let mut session = Self {
             scene,
             log,
             settings: Settings::of(scene),
-            haptic: HapticState::new(scene.start),
+            haptic: HapticState {
+                guard: scene.guard.map(Guard::new).transpose()?,
+                ..HapticState::new(scene.start)
+            },
             pass: ContactPass::new(scene),
             current: ContactSnapshot::empty(&scene.body, &scene.start),
             pending: VecDeque::new(),
@@ -61,7 +69,7 @@ impl<'a> Replay<'a> {
             session.look(0, 0.0, &handle, log.first_ahead);
             session.take(0);
         }
-        session
+        Ok(session)
     }
 
     /// One tick, with the pass that looked at its state.
@@ -84,7 +92,7 @@ impl<'a> Replay<'a> {
         let depth = depth(self.scene, distance);
         let of = &self.settings.body;
         recording.push(Row::of_body(self.scene, of, row.time, &result, depth, counts), &result);
-        if result.flags.contains(Flags::FAULT_LATCHED) && recording.fault_time.is_none() {
+        if result.flags.no_force() && recording.fault_time.is_none() {
             recording.fault_time = Some(row.time);
         }
     }

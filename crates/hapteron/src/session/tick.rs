@@ -4,6 +4,7 @@ use super::command::ContactLaw;
 use super::grasp::{Buttons, Grip};
 use super::{ContactSnapshot, Flags};
 use crate::scene::{ContactModel, Scene};
+use hapteron_device::guard::{Guard, GuardInput};
 use hapteron_device::{DeviceCommand, DeviceSample, Scaling};
 use hapteron_dynamics::{ContactForce, Coupling, Handle, Method, Problem, RigidBody, State, Step, step};
 use nalgebra::Vector3;
@@ -64,13 +65,21 @@ pub struct HapticState {
     pub fault: Option<Flags>,
     /// What the hand holds, and where its workspace lies in the world.
     pub grip: Grip,
+    /// What the command goes through at the end; none where no one feels it.
+    pub guard: Option<Guard>,
 }
 
 impl HapticState {
-    /// A body without a fault.
+    /// A body without a fault, and a command that nothing guards: for replays.
     #[must_use]
     pub fn new(state: State) -> Self {
-        Self { state, fault: None, grip: Grip::new() }
+        Self { state, fault: None, grip: Grip::new(), guard: None }
+    }
+
+    /// A body without a fault, and a guard before the device.
+    #[must_use]
+    pub fn guarded(state: State, guard: Guard) -> Self {
+        Self { guard: Some(guard), ..Self::new(state) }
     }
 
     /// Takes the body's momentum away.
@@ -100,7 +109,8 @@ pub struct Tick {
 /// One haptic tick: the step from the last tick to the device sample's time `now` (seconds), and the command for the device.
 ///
 /// Pure: the same arguments give the same bits, and nothing else is read or written. A fault (a number that is not finite, a singular
-/// system) latches: from then on the body stays and the command is zero. Section 3.1 of the paper.
+/// system) latches: from then on the body stays and the command is zero. Section 3.1 of the paper. The command goes through the guard, if
+/// there is one, as the last thing; the sample's time and `now` must be of one clock then.
 ///
 /// Real time: no allocation, lock, clock, input or output and no panic; time in proportion to the snapshot's planes, of which there
 /// are at most [`super::MAX_PLANES`].
@@ -144,12 +154,28 @@ pub fn tick(
         grip.silence();
         next = Step { state: before.state, status: next.status, ..stopped(&before.state) };
     }
+    let contact_age = now - contacts.time();
+    let mut guard = before.guard;
+    if let Some(guard) = &mut guard {
+        let sample_age = now - sample.time;
+        let simulation_fault = fault.is_some();
+        let guarded = guard.pass(&GuardInput {
+            command,
+            sample: *sample,
+            time: now,
+            contact_age,
+            sample_age,
+            simulation_fault,
+        });
+        command = guarded.command;
+        flags = flags.with(Flags::from_guard(guarded.status));
+    }
     Tick {
-        after: HapticState { state: next.state, fault, grip },
+        after: HapticState { state: next.state, fault, grip, guard },
         handle,
         step: next,
         command,
-        contact_age: now - contacts.time(),
+        contact_age,
         flags,
     }
 }

@@ -39,6 +39,7 @@ use super::{Command, ContactLaw, ContactPass, ContactSnapshot, Flags, HapticStat
 use crate::scene::{Scene, handle_at};
 use contact_thread::ContactLoop;
 use exchange::{Found, Seen, exchange};
+use hapteron_device::guard::{Guard, GuardError};
 use hapteron_device::{Device, DeviceFault, DeviceSample};
 use haptic_thread::Loop;
 use lookahead::Lookahead;
@@ -47,6 +48,8 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
 
+/// SCHED_FIFO priority that the haptic thread asks for: above the interrupts' threads (50), below the kernel's own watch (99).
+pub const HAPTIC_PRIORITY: i32 = 80;
 /// Ticks a second that the haptic thread can be asked for.
 pub const RATES: std::ops::RangeInclusive<f64> = 500.0..=8000.0;
 /// Time steps are compared with the rates to this share.
@@ -91,12 +94,11 @@ impl RealTimeOptions {
     /// The defaults for a scene.
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
-        let _ = scene;
         Self {
-            priority: Some(80),
+            priority: Some(HAPTIC_PRIORITY),
             cpu: None,
-            contact_priority: None,
-            contact_cpu: None,
+            contact_priority: scene.file.contact_thread.priority,
+            contact_cpu: scene.file.contact_thread.cpu,
             lock_memory: true,
             spin: clock::SPIN,
             duration: None,
@@ -120,6 +122,9 @@ pub enum StartError {
         "integrator.time_step is {0} s, {1:.0} ticks a second; in real time there can be 500 to 8000 (0.002 to 0.000125 s)"
     )]
     Rate(f64, f64),
+    /// A limit of the guard.
+    #[error("guard: {0}")]
+    Guard(GuardError),
     /// The device.
     #[error("{0}: {1}")]
     Device(String, DeviceFault),
@@ -146,8 +151,15 @@ impl RealTime {
             return Err(StartError::Rate(scene.time_step, rate));
         }
         let name = device.capabilities().name.clone();
+        let guard = match scene.guard.map(Guard::new).transpose() {
+            Ok(guard) => guard,
+            Err(error) => {
+                device.stop();
+                return Err(StartError::Guard(error));
+            }
+        };
         match prepare(device.as_mut()) {
-            Ok(sample) => launch(scene, device, sample, options),
+            Ok(sample) => launch(scene, device, guard, sample, options),
             Err(fault) => {
                 device.stop();
                 Err(StartError::Device(name, fault))
@@ -166,11 +178,12 @@ fn prepare(device: &mut dyn Device) -> Result<DeviceSample, DeviceFault> {
 fn launch(
     scene: Arc<Scene>,
     device: Box<dyn Device>,
+    guard: Option<Guard>,
     sample: DeviceSample,
     options: RealTimeOptions,
 ) -> Result<Running, StartError> {
     let settings = Settings::of(&scene);
-    let haptic = HapticState::new(scene.start);
+    let haptic = HapticState { guard, ..HapticState::new(scene.start) };
     let (pass, found, first_pass) = first_contacts(&scene, &sample);
     let seen = Seen {
         of_tick: 0,

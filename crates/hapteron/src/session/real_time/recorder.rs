@@ -4,7 +4,7 @@ use super::telemetry::{PassRecord, TickRecord};
 use crate::recording::{Recording, Row};
 use crate::scene::Scene;
 use crate::session::log::Log;
-use crate::session::{Command, ContactPass, Flags};
+use crate::session::{Command, ContactPass};
 use hapteron_dynamics::RigidBody;
 use std::sync::Arc;
 
@@ -52,7 +52,7 @@ impl Recorder {
         // How deep it is, is known when its pass is, or measured at the end.
         let unknown = f64::NAN;
         let row = Row::of_body(&self.scene, &self.body, record.time, &record.result, unknown, record.counts);
-        if row.flags.contains(Flags::FAULT_LATCHED) && self.recording.fault_time.is_none() {
+        if row.flags.no_force() && self.recording.fault_time.is_none() {
             self.recording.fault_time = Some(record.time);
         }
         self.recording.push(row, &record.result);
