@@ -241,6 +241,9 @@ impl eframe::App for Window {
         let seconds = self.frames.since.elapsed().as_secs_f64();
         if self.live.is_some() && seconds > 1.0 {
             let rate = self.frames.count as f64 / seconds;
+            if let Some(live) = &self.live {
+                eprintln!("{}", live.timing_line());
+            }
             eprintln!("{} pictures in {seconds:.1} s: {rate:.1} a second", self.frames.count);
         }
     }

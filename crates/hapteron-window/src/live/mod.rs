@@ -75,6 +75,8 @@ pub struct Live {
     /// Kind of the driver whose device is the hand; none: the window.
     device: Option<&'static str>,
     steering: Steering,
+    /// Where the steering was in the last picture.
+    last_goal: Isometry3<f64>,
     camera: Camera,
     hovered: bool,
     paused: bool,
@@ -110,6 +112,7 @@ impl Live {
         let values = Values::of(&scene);
         Ok(Self {
             steering: Steering::new(start_of_handle(&scene)),
+            last_goal: start_of_handle(&scene),
             past: Past::new(&scene),
             scene,
             shapes,
@@ -165,6 +168,22 @@ impl Live {
         wanted
     }
 
+    /// How well the threads have kept their time, in a line.
+    #[must_use]
+    pub fn timing_line(&self) -> String {
+        let timing = self.session.timing();
+        let late = |share: f64| timing.lateness.quantile_ns(share) as f64 * 1e-3;
+        format!(
+            "{} ticks; late by p50 {:.1}, p99 {:.1}, p99.9 {:.1} us; {} deadlines missed; {} records lost",
+            timing.ticks,
+            late(0.5),
+            late(0.99),
+            late(0.999),
+            timing.missed,
+            timing.lost
+        )
+    }
+
     fn poll(&mut self) {
         let before = self.session.ended().is_some();
         self.session.poll(&mut self.history, self.recorder.as_mut());
@@ -181,10 +200,11 @@ impl Live {
                 ));
             }
         }
-        if self.session.take_moved() || self.source == Source::Motion {
-            if let Some(handle) = self.handle() {
-                self.steering.set(handle);
-            }
+        let moved = self.session.take_moved();
+        if (moved || self.source == Source::Motion)
+            && let Some(handle) = self.handle()
+        {
+            self.steering.set(handle);
         }
         if !before && let Some(end) = self.session.ended() {
             let regular = end.is_regular();
@@ -199,10 +219,13 @@ impl Live {
     fn tell(&mut self) {
         let reach = (FARTHEST_PULL / self.values.gains.linear_stiffness.max(1e-9))
             .clamp(0.05 * self.radius(), self.radius());
-        if let Some(row) = self.history.newest().filter(|_| self.session.is_held()) {
+        // Only a hand that moves is kept near: one that stands still must not be taken along by a body that flies off.
+        let moves = self.steering.goal() != self.last_goal;
+        if let Some(row) = self.history.newest().filter(|_| moves && self.session.is_held()) {
             let unstretched = row.body * self.session.grasp() * nalgebra::Point3::origin();
             self.steering.keep_near(&unstretched, reach);
         }
+        self.last_goal = self.steering.goal();
         self.session.steer(&self.steering.goal(), self.source, self.hold, self.repeat && !self.replays);
         if self.values != self.told && self.session.ended().is_none() {
             match self.session.change(&self.values, &self.told) {
