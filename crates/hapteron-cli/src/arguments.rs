@@ -49,7 +49,17 @@ pub enum Command {
         after_help = "Example:\n  hapteron models my-models\n  hapteron run my-models/spoon_in_cup.toml --virtual-time\n"
     )]
     Models(Models),
+    /// See and feel a scene in a window: 3D view, plots, sliders; pointer and keys stand in for a haptic device
+    #[command(after_help = LIVE_EXAMPLES)]
+    Live(Live),
 }
+
+const LIVE_EXAMPLES: &str = "Examples:
+  hapteron live                      the start page
+  hapteron live --scene jaws         a built-in scene: jaws, spoon_in_cup, spoon_in_free_space
+  hapteron live my-scene.toml
+  hapteron live --scene jaws --screenshot jaws.png --after 5
+";
 
 const RUN_EXAMPLES: &str = "Examples:
   hapteron run scene.toml
@@ -227,4 +237,51 @@ pub enum Figure {
     Fig4,
     /// The jaws: the linearized contact model and slow contact threads
     Fig6,
+}
+
+/// `hapteron live`
+#[derive(Args, Debug)]
+#[cfg_attr(not(feature = "window"), allow(dead_code))]
+pub struct Live {
+    /// The scene (TOML) [default: the start page]
+    #[arg(value_name = "SCENE.toml")]
+    pub file: Option<PathBuf>,
+    /// A built-in scene instead of a file
+    #[arg(long, value_name = "NAME", conflicts_with = "file", value_parser = hapteron::scenes::NAMES)]
+    pub scene: Option<String>,
+    /// Bright surroundings [default: as the system]
+    #[arg(long, conflicts_with = "dark")]
+    pub light: bool,
+    /// Dark surroundings [default: as the system]
+    #[arg(long)]
+    pub dark: bool,
+    /// Width and height of the window, points [default: 1280x800]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[f32; 2]>,
+    /// Save a picture of the window (PNG) and close
+    #[arg(long, value_name = "FILE")]
+    pub screenshot: Option<PathBuf>,
+    /// When to take the picture, seconds [default: 3]; without --screenshot: when to close
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub after: Option<f64>,
+    /// Write where buttons and values are (name,left,top,right,bottom; pixels), for scripts that drive the window
+    #[arg(long, value_name = "FILE")]
+    pub widgets: Option<PathBuf>,
+}
+
+/// A time that a person can wait for.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=1e6).contains(&seconds) => Ok(seconds),
+        _ => Err("must be a number of seconds, not negative".to_owned()),
+    }
+}
+
+/// Width and height, as in 1280x800.
+fn size(text: &str) -> Result<[f32; 2], String> {
+    let parse = |word: &str| word.parse::<f32>().ok().filter(|n| (100.0..=10_000.0).contains(n));
+    match text.split_once('x').map(|(w, h)| (parse(w), parse(h))) {
+        Some((Some(width), Some(height))) => Ok([width, height]),
+        _ => Err("must be width and height as in 1280x800, each from 100 to 10000".to_owned()),
+    }
 }

@@ -26,6 +26,7 @@ fn main() -> ExitCode {
         Command::Devices(a) => commands::devices::devices(&a),
         Command::Stability(a) => commands::stability::stability(&a),
         Command::Models(a) => commands::models::models(&a),
+        Command::Live(a) => commands::live::live(&a),
     };
     match outcome {
         Ok(code) => code,
