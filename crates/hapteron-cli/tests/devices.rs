@@ -70,5 +70,6 @@ fn lists_attached_devices_with_their_capabilities() {
     assert_eq!(json[0]["attached"][0]["peak_torque"], 0.2);
     assert_eq!(json[0]["missing"], Value::Null);
     assert_eq!(json[1]["attached"][0]["continuous_force"], 1.4);
-    assert_eq!(json[3]["attached"][0]["max_stiffness"], Value::Null);
+    assert_eq!(json[1]["attached"][0]["stiffness"], 3500.0);
+    assert_eq!(json[3]["attached"][0]["stiffness"], 0.0);
 }

@@ -204,6 +204,18 @@ fn malformed_numbers_go_nowhere() {
     assert_eq!(emulator.get("applied"), 0.0);
 }
 
+/// Guards a reading that does not come in time: told for that tick, and over with it.
+#[test]
+fn late_readings_are_told_and_left_behind() {
+    let emulator = EmulatedLibrary::new("dhd");
+    let mut device = ready(&emulator);
+    emulator.set("late", 1.0);
+    assert_eq!(device.read().unwrap_err(), DeviceFault::Late);
+    emulator.set("late", 0.0);
+    assert!(device.read().is_ok());
+    assert_eq!(device.write(&push(1.0)).unwrap(), Applied::Fully);
+}
+
 /// Guards unplugging: told at once, by read and by write; stopping and dropping stay harmless.
 #[test]
 fn unplugged() {

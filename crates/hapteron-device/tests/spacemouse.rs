@@ -66,12 +66,47 @@ fn every_axis_in_our_frame() {
 fn greets_in_the_daemons_protocol() {
     let mut old = Spacenavd::start(0);
     let _device = open(&old);
-    old.button(0, true);
-    assert_eq!(old.said, 1.0f32.to_ne_bytes());
+    assert_eq!(old.hear(4), 1.0f32.to_ne_bytes());
     let mut new = Spacenavd::start(1);
     let _device = open(&new);
-    new.button(0, true);
-    assert_eq!(new.said[..8], [0x7FAA_1003_i32.to_ne_bytes(), 7i32.to_ne_bytes()].concat());
+    assert_eq!(new.hear(32)[..8], [0x7FAA_1003_i32.to_ne_bytes(), 7i32.to_ne_bytes()].concat());
+}
+
+/// Guards the emulator against the project's own client library: what it sends, libspnav understands.
+#[test]
+#[allow(unsafe_code, reason = "calls a C library")]
+fn libspnav_understands_the_emulator() {
+    // SAFETY: the library has no initialisers that matter here.
+    let Ok(library) = (unsafe { libloading::Library::new("libspnav.so.0") }) else {
+        println!("skipped: libspnav.so.0 is not installed");
+        return;
+    };
+    for protocol in [0, 1] {
+        let mut daemon = Spacenavd::start(protocol);
+        // SAFETY: the functions have these types in spnav.h; no other test of this file reads the environment.
+        let (open, wait, close) = unsafe {
+            std::env::set_var("SPNAV_SOCKET", daemon.path());
+            (
+                *library.get::<unsafe extern "C" fn() -> i32>(b"spnav_open").unwrap(),
+                *library.get::<unsafe extern "C" fn(*mut i32) -> i32>(b"spnav_wait_event").unwrap(),
+                *library.get::<unsafe extern "C" fn() -> i32>(b"spnav_close").unwrap(),
+            )
+        };
+        // SAFETY: no arguments.
+        assert_eq!(unsafe { open() }, 0);
+        daemon.motion([1, -2, 3, -4, 5, -6], 16);
+        daemon.button(2, true);
+        // More than the library's union of events has; its first eight numbers are the record's.
+        let mut event = [0i32; 64];
+        // SAFETY: room enough.
+        assert!(unsafe { wait(event.as_mut_ptr()) } > 0);
+        assert_eq!(event[1..7], [1, -2, 3, -4, 5, -6], "{protocol}");
+        // SAFETY: as above.
+        assert!(unsafe { wait(event.as_mut_ptr()) } > 0);
+        assert_eq!(event[1..3], [1, 2], "button 2 pressed, {protocol}");
+        // SAFETY: no arguments.
+        unsafe { close() };
+    }
 }
 
 /// Guards rest: the dead zone, silence after two periods, and a reach that is not left.

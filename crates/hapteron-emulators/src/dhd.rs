@@ -79,8 +79,8 @@ impl Dhd {
             "silence" => self.silence(value),
             "type" | "left" | "wrist" | "active_wrist" | "count" | "serial" | "velocity_unknown"
             | "refuse_forces" | "refuse_velocity" | "malformed" | "skewed" | "disconnected" | "unpowered"
-            | "max_force" | "watchdog_missing" | "buttons" | "auto_init_fails" | "robotic" | "by_hand"
-            | "open_fails" => {
+            | "max_force" | "watchdog_missing" | "buttons" | "late" | "auto_init_fails" | "robotic"
+            | "by_hand" | "open_fails" => {
                 self.script.insert(name.into(), value);
             }
             _ => return false,
@@ -316,7 +316,10 @@ unsafe extern "system" fn dhdGetPositionAndOrientationFrame(
     _id: c_char,
 ) -> c_int {
     let (code, position, rows) = with(|d| {
-        let code = d.reach().err().unwrap_or(1);
+        let mut code = d.reach().err().unwrap_or(1);
+        if d.is("late") {
+            code = d.fail(ERROR_TIMEOUT);
+        }
         let mut position = d.hand.position;
         if !d.homed || d.scripted("malformed", 0.0) == 1.0 {
             position.y = f64::NAN;

@@ -10,10 +10,8 @@ use std::time::Duration;
 /// A daemon that waits for one client, then is scripted.
 pub struct Spacenavd {
     path: PathBuf,
-    greeting: Option<JoinHandle<(UnixStream, Vec<u8>)>>,
+    greeting: Option<JoinHandle<UnixStream>>,
     client: Option<UnixStream>,
-    /// What the client said after its first message.
-    pub said: Vec<u8>,
 }
 
 impl Spacenavd {
@@ -29,7 +27,7 @@ impl Spacenavd {
         let _ = std::fs::remove_file(&path);
         let listener = UnixListener::bind(&path).expect("a path to listen at");
         let greeting = std::thread::spawn(move || greet(&listener, protocol));
-        Self { path, greeting: Some(greeting), client: None, said: Vec::new() }
+        Self { path, greeting: Some(greeting), client: None }
     }
 
     /// Where it listens.
@@ -40,11 +38,21 @@ impl Spacenavd {
 
     fn client(&mut self) -> &mut UnixStream {
         if let Some(greeting) = self.greeting.take() {
-            let (client, said) = greeting.join().expect("a client");
-            self.client = Some(client);
-            self.said = said;
+            self.client = Some(greeting.join().expect("a client"));
         }
         self.client.as_mut().expect("a client that is not hung up on")
+    }
+
+    /// What the client says next, so many bytes.
+    ///
+    /// # Panics
+    /// When it says less.
+    pub fn hear(&mut self, count: usize) -> Vec<u8> {
+        let mut said = vec![0; count];
+        let client = self.client();
+        let _ = client.set_read_timeout(Some(Duration::from_secs(10)));
+        client.read_exact(&mut said).expect("a client that speaks");
+        said
     }
 
     /// Sends anything.
@@ -86,24 +94,16 @@ impl Drop for Spacenavd {
     }
 }
 
-/// The first words with a client, and what it says in the next moment.
-fn greet(listener: &UnixListener, protocol: u8) -> (UnixStream, Vec<u8>) {
+/// The first words with a client.
+fn greet(listener: &UnixListener, protocol: u8) -> UnixStream {
     let (mut client, _) = listener.accept().expect("a client");
     let mut first = [0; 4];
     client.read_exact(&mut first).expect("a greeting");
     let wants = u32::from_ne_bytes(first);
     assert_eq!(wants & 0xFFFF_FF00, 0x7FAA_5500, "the client's greeting");
-    let mut length = 4;
     if protocol > 0 {
         let agreed = (wants & 0xFFFF_FF00) | (wants & 0xFF).min(u32::from(protocol));
         client.write_all(&agreed.to_ne_bytes()).expect("a client that listens");
-        length = 32;
     }
-    let mut said = vec![0; length];
-    let _ = client.set_read_timeout(Some(Duration::from_secs(10)));
-    client.read_exact(&mut said).expect("a sensitivity or a request");
-    if protocol > 0 {
-        client.write_all(&said).expect("a client that listens");
-    }
-    (client, said)
+    client
 }

@@ -119,4 +119,5 @@ pub fn check_capabilities(c: &Capabilities) {
     assert!(c.peak_torque >= c.continuous_torque, "{c:?}");
     assert_eq!(c.drives_force, c.peak_force > 0.0);
     assert_eq!(c.drives_torque, c.peak_torque > 0.0);
+    assert_eq!(c.drives_force, c.max_stiffness > 0.0 && c.max_damping > 0.0);
 }

@@ -198,10 +198,12 @@ impl Device for ForceDimension {
     fn home(&mut self) -> Result<(), DeviceFault> {
         self.fault = None;
         let f = self.functions;
-        if !self.status()?.reset && (f.drdIsInitialized.is_none() || f.flag(f.drdIsInitialized, self.id)) {
+        let robotic = self.homing == Homing::Automatic && f.flag(f.drdIsSupported, self.id);
+        // A wrist may be lost although the arm is not; only the robotic part knows.
+        let lost = robotic && f.drdIsInitialized.is_some() && !f.flag(f.drdIsInitialized, self.id);
+        if !self.status()?.reset && !lost {
             return Ok(());
         }
-        let robotic = self.homing == Homing::Automatic && f.flag(f.drdIsSupported, self.id);
         let automatic = if robotic { f.auto_init(self.id) } else { None };
         let homed = match automatic {
             Some(outcome) => {

@@ -22,6 +22,9 @@ use std::time::{Duration, Instant};
 /// Millimetres to metres, millinewton metres to newton metres.
 const MILLI: f64 = 1e-3;
 
+/// How long the scheduler may take to start.
+const START: Duration = Duration::from_secs(2);
+
 type ControlPointer = *mut (dyn FnMut(&DeviceSample) -> Option<DeviceCommand> + Send + 'static);
 
 /// What the callback needs of the device.
@@ -100,13 +103,14 @@ impl Gate {
     }
 
     fn wait(&self, patience: Duration) {
-        let mut seen = (self.ticks.load(Ordering::Relaxed), Instant::now());
+        let first = self.ticks.load(Ordering::Relaxed);
+        let mut seen = (first, Instant::now());
         while !self.ended.load(Ordering::SeqCst) {
             std::thread::sleep(Duration::from_millis(1));
             let ticks = self.ticks.load(Ordering::Relaxed);
             if ticks != seen.0 {
                 seen = (ticks, Instant::now());
-            } else if seen.1.elapsed() > patience {
+            } else if seen.1.elapsed() > if ticks == first { patience.max(START) } else { patience } {
                 return;
             }
         }

@@ -257,6 +257,7 @@ fn axes(text: &str) -> Option<Axes> {
 
 fn capabilities(tracker: &str, drives_force: bool, force: f64) -> Capabilities {
     let force = if drives_force { force } else { 0.0 };
+    let unknown = if force > 0.0 { f64::INFINITY } else { 0.0 };
     Capabilities {
         name: format!("VRPN {tracker}{}", if drives_force { " with force device" } else { "" }),
         senses_rotation: true,
@@ -266,9 +267,9 @@ fn capabilities(tracker: &str, drives_force: bool, force: f64) -> Capabilities {
         continuous_force: force,
         peak_torque: 0.0,
         continuous_torque: 0.0,
-        max_stiffness: f64::INFINITY,
+        max_stiffness: unknown,
         max_angular_stiffness: 0.0,
-        max_damping: f64::INFINITY,
+        max_damping: unknown,
         workspace: [Vector3::zeros(); 2],
         rate: 1000.0,
         buttons: 32,
