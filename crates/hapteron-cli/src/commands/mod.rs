@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod demo;
+pub mod levels;
 pub mod mesh;
 pub mod models;
 pub mod query;

@@ -1,12 +1,14 @@
 //! Reports: one HTML file that needs nothing else, with pictures, tables and plots that can be zoomed.
 
 mod compare;
+mod levels;
 mod picture;
 mod plot;
 mod reproduction;
 mod run;
 
 pub use compare::{Compared, comparison};
+pub use levels::levels;
 pub use reproduction::reproduction;
 pub use run::run;
 
