@@ -51,6 +51,7 @@ const RUN_EXAMPLES: &str = "Examples:
 const QUERY_EXAMPLES: &str = "Examples:
   hapteron query body.obj obstacle.obj --poses poses.csv --tolerance 0.001
   hapteron query body.stl obstacle.stl --poses poses.csv --tolerance 0.0002 --contacts contacts.csv --rate
+  hapteron query body.stl obstacle.stl --poses poses.csv --tolerance 0.0002 --error-threshold 0.025 --rate
 ";
 
 /// `hapteron demo`
@@ -102,6 +103,10 @@ pub struct Query {
     /// Metres per unit of both meshes
     #[arg(long, default_value_t = 1.0, value_name = "S")]
     pub scale: f64,
+    /// Contacts may be as coarse as this share of A's radius, such as 0.025; each then has a weight, the number of vertices
+    /// that it stands for. 0 is exact
+    #[arg(long, default_value_t = 0.0, value_name = "S")]
+    pub error_threshold: f64,
     /// Tell on stderr how long the queries took
     #[arg(long)]
     pub rate: bool,

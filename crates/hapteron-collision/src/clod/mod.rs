@@ -8,8 +8,10 @@
 mod build;
 pub mod cache;
 mod nearest;
+mod query;
 
 pub use build::{BuildError, Progress};
+pub use query::{Combine, Detail, Lod, LodWorkspace, View, query_levels};
 
 use crate::surface::Surface;
 use crate::vector::Vec3;
@@ -199,6 +201,12 @@ impl Hierarchy {
 
     pub(crate) fn hull(&self, node: &Node) -> &[Vec3] {
         &self.hull_vertices[range(node.hull)]
+    }
+
+    /// Radius of a sphere around the surface, metres: what error thresholds are a share of.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.nodes.first().map_or(0.0, |root| root.radius)
     }
 
     /// Memory that it holds, in bytes.

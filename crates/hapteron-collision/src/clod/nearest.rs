@@ -35,8 +35,9 @@ impl Nearest {
                 continue;
             }
             if index & LEAF != 0 {
-                if index & !LEAF != guess {
-                    self.look(surface, index & !LEAF, p);
+                let leaf = index & !LEAF;
+                if leaf != guess && !self.misses_slab(surface, leaf, p, slack) {
+                    self.look(surface, leaf, p);
                 }
                 continue;
             }
@@ -64,6 +65,15 @@ impl Nearest {
         self.triangle != NOWHERE
     }
 
+    /// Whether the slab around a leaf is farther away than what was found.
+    #[inline(always)]
+    fn misses_slab(&self, surface: &Surface, leaf: u32, p: Vec3, slack: f32) -> bool {
+        let leaf = &surface.leaves[leaf as usize];
+        let height = dot(leaf.normal.map(f64::from), p);
+        let beyond = (f64::from(leaf.low) - height).max(height - f64::from(leaf.high)) - f64::from(slack);
+        beyond > 0.0 && beyond * beyond > self.squared
+    }
+
     #[inline(always)]
     fn look(&mut self, surface: &Surface, leaf: u32, p: Vec3) {
         let (squared, lane) = point_block(p, &surface.blocks[leaf as usize]);
@@ -73,6 +83,19 @@ impl Nearest {
             self.leaf = leaf;
         }
     }
+}
+
+/// [`Nearest::search`] as a call of its own, in the widest vector instructions that there are.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+pub(crate) fn search(
+    nearest: &mut Nearest,
+    surface: &Surface,
+    p: Vec3,
+    guess: u32,
+    limit: f64,
+    slack: f32,
+) -> bool {
+    nearest.search(surface, p, guess, limit, slack)
 }
 
 /// Squared distances of a point to the boxes of a node's children, from below.

@@ -1,7 +1,7 @@
 //! What a node knows of its patch and of the original surface that it stands for, measured.
 
 use super::simplify::Level;
-use crate::clod::nearest::{NOWHERE, Nearest, distance_to_hull, distance_to_triangle, slack};
+use crate::clod::nearest::{NOWHERE, Nearest, distance_to_hull, distance_to_triangle, search, slack};
 use crate::surface::Surface;
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or_zero};
 
@@ -59,7 +59,7 @@ impl Search {
         while let Some(([a, b, c], depth)) = self.stack.pop() {
             let center = scale(add(add(a, b), c), 1.0 / 3.0);
             let limit = 4.0 * surface.radius + norm(center);
-            if !self.nearest.search(surface, center, self.leaf, limit, slack(surface.radius)) {
+            if !search(&mut self.nearest, surface, center, self.leaf, limit, slack(surface.radius)) {
                 continue;
             }
             self.leaf = self.nearest.leaf;
