@@ -93,7 +93,7 @@ fn levels(body: &Surface, obstacle: &Surface, threshold: f64) -> Result<Option<[
         return Ok(None);
     }
     let folder = default_folder();
-    let mut build = |surface| levels::build(surface, folder.as_deref(), &mut std::io::stderr());
+    let build = |surface| levels::build(surface, folder.as_deref(), &mut std::io::stderr());
     Ok(Some([build(body)?, build(obstacle)?]))
 }
 
