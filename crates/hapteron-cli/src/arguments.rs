@@ -28,7 +28,9 @@ pub enum Command {
     #[command(after_help = QUERY_EXAMPLES)]
     Query(Query),
     /// Check and describe a mesh
-    #[command(after_help = "Examples:\n  hapteron mesh part.stl\n  hapteron mesh part.stl --scale 0.001\n")]
+    #[command(
+        after_help = "Examples:\n  hapteron mesh part.stl\n  hapteron mesh part.stl --scale 0.001 --build --out levels\n"
+    )]
     Mesh(Mesh),
     /// Two runs side by side: a table and a report
     #[command(after_help = "Example:\n  hapteron compare runs/a runs/b\n")]
@@ -76,6 +78,7 @@ const STABILITY_EXAMPLES: &str = "Examples:
 const QUERY_EXAMPLES: &str = "Examples:
   hapteron query body.obj obstacle.obj --poses poses.csv --tolerance 0.001
   hapteron query body.stl obstacle.stl --poses poses.csv --tolerance 0.0002 --contacts contacts.csv --rate
+  hapteron query body.stl obstacle.stl --poses poses.csv --tolerance 0.0002 --error-threshold 0.025 --rate
 ";
 
 /// `hapteron demo`
@@ -157,6 +160,10 @@ pub struct Query {
     /// Metres per unit of both meshes
     #[arg(long, default_value_t = 1.0, value_name = "S")]
     pub scale: f64,
+    /// Contacts may be as coarse as this share of A's radius, such as 0.025; each then has a weight, the number of vertices
+    /// that it stands for. 0 is exact
+    #[arg(long, default_value_t = 0.0, value_name = "S")]
+    pub error_threshold: f64,
     /// Tell on stderr how long the queries took
     #[arg(long)]
     pub rate: bool,
@@ -171,6 +178,15 @@ pub struct Mesh {
     /// Metres per unit of the mesh
     #[arg(long, default_value_t = 1.0, value_name = "S")]
     pub scale: f64,
+    /// Make and cache the contact levels of detail, print them, and draw them in a report
+    #[arg(long)]
+    pub build: bool,
+    /// With --build: folder for the report [default: runs/mesh, numbered when it exists]
+    #[arg(long, value_name = "DIR", requires = "build")]
+    pub out: Option<PathBuf>,
+    /// With --build: folder of the cache [default: hapteron in the user's cache folder]
+    #[arg(long, value_name = "DIR", requires = "build")]
+    pub cache: Option<PathBuf>,
 }
 
 /// `hapteron compare`

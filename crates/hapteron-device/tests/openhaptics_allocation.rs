@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 #![allow(unsafe_code, reason = "an allocator that counts")]
 
-mod common;
+mod emulated;
 
-use common::EmulatedLibrary;
+use emulated::EmulatedLibrary;
 use hapteron_device::DeviceCommand;
 use hapteron_device::drivers::{self, DriverOptions};
 use nalgebra::Vector3;

@@ -1,6 +1,7 @@
 //! Reports: one HTML file that needs nothing else, with pictures, tables and plots that can be zoomed.
 
 mod compare;
+mod levels;
 mod picture;
 mod plot;
 mod reproduction;
@@ -9,6 +10,7 @@ mod stability;
 mod timing;
 
 pub use compare::{Compared, comparison};
+pub use levels::levels;
 pub use reproduction::reproduction;
 pub use run::{Live, Outcome, Time, run};
 pub use stability::stability;

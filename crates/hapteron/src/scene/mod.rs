@@ -17,6 +17,7 @@ use crate::session::grasp::Buttons;
 use crate::trajectory::Trajectory;
 use error::Source;
 use hapteron_collision::Surface;
+use hapteron_collision::clod::{Detail, Hierarchy, Lod};
 use hapteron_collision::mesh::TriMesh;
 use hapteron_device::drivers::DriverOptions;
 use hapteron_device::guard::{Guard, GuardSettings};
@@ -25,6 +26,7 @@ use hapteron_device::{Capabilities, DeviceSample, HandParameters, Scaling};
 use hapteron_dynamics::{Coupling, Handle, Method, RigidBody, State};
 use nalgebra::{Isometry3, Vector3};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A mesh with the structure that queries need.
 #[derive(Clone, Debug)]
@@ -33,6 +35,16 @@ pub struct Model {
     pub mesh: TriMesh,
     /// Of the mesh, for queries.
     pub surface: Surface,
+    /// Its contact levels of detail, where the scene has an error threshold.
+    pub hierarchy: Option<Arc<Hierarchy>>,
+}
+
+impl Model {
+    /// Surface and levels, where there are levels.
+    #[must_use]
+    pub fn lod(&self) -> Option<Lod<'_>> {
+        self.hierarchy.as_deref().map(|hierarchy| Lod { surface: &self.surface, hierarchy })
+    }
 }
 
 /// A fixed object.
@@ -53,6 +65,8 @@ pub struct ContactSettings {
     pub damping: f64,
     /// d, metres.
     pub tolerance: f64,
+    /// How coarse contacts may be.
+    pub detail: Detail,
     /// Most clusters; 0: every contact is a plane of its own.
     pub max_clusters: usize,
     /// Contacts farther than this from a cluster found one of their own, metres.

@@ -9,11 +9,13 @@ use crate::session::real_time::HAPTIC_PRIORITY;
 use crate::trajectory::{PoseRow, Trajectory};
 use crate::{assets, motion};
 use hapteron_collision::Surface;
+use hapteron_collision::clod::{Detail, cache};
 use hapteron_collision::mesh::{self, TriMesh};
 use hapteron_device::{DeviceSample, Scaling};
 use hapteron_dynamics::{Coupling, Method, RigidBody, Spring, State};
 use nalgebra::{Isometry3, Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::path::Path;
+use std::sync::Arc;
 
 const BUILTIN: &str = "builtin:";
 /// Density of a body that is given neither mass nor density: water's, kg/m^3.
@@ -33,9 +35,9 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
     file.scene.seed.get_or_insert(0);
     let gravity = resolver.vector("scene.gravity", *file.scene.gravity.get_or_insert([0.0; 3]))?;
 
-    let model = resolver.model("body.mesh", &mut file.body.mesh, "body.scale", &mut file.body.scale)?;
+    let mut model = resolver.model("body.mesh", &mut file.body.mesh, "body.scale", &mut file.body.scale)?;
     let (body, center_of_mass) = resolver.mass(&mut file.body, &model.mesh)?;
-    let obstacles = resolver.obstacles(&mut file.obstacle)?;
+    let mut obstacles = resolver.obstacles(&mut file.obstacle)?;
     let scaling = file.device.position_scale.get_or_insert(1.0);
     let scaling = Scaling::new(*scaling).map_err(|e| source.fault("device.position_scale", e.to_string()))?;
     let buttons = resolver.buttons(&mut file.device)?;
@@ -45,7 +47,11 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
     let handle = closed.sensed(trajectory.sample(0.0, time_step));
     let coupling = resolver.coupling(&mut file, &handle, center_of_mass)?;
     let start = resolver.start(&mut file, &handle, &body, center_of_mass)?;
-    let contact = resolver.contact(&mut file, &body, &model.surface, time_step)?;
+    let contact = resolver.contact(&mut file, &body, &model, time_step)?;
+    if !contact.detail.is_exact() {
+        let models = std::iter::once(&mut model).chain(obstacles.iter_mut().map(|o| &mut o.model));
+        models.for_each(add_levels);
+    }
     Ok(Scene {
         file,
         body,
@@ -71,6 +77,14 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
         guard: closed.guard,
         start,
     })
+}
+
+/// Levels of detail from the user's cache, or else built and put there.
+fn add_levels(model: &mut Model) {
+    let folder = cache::default_folder();
+    // Cannot be cancelled, so it cannot fail.
+    let found = cache::load_or_build(&model.surface, folder.as_deref(), &mut |_| true);
+    model.hierarchy = found.ok().map(|(hierarchy, _)| Arc::new(hierarchy));
 }
 
 pub(super) struct Resolver<'a> {
@@ -140,7 +154,7 @@ impl Resolver<'_> {
             raw.scaled(factor).map_err(|e| self.source.fault(scale_key, e.to_string()))?
         };
         let surface = Surface::build(&mesh);
-        Ok(Model { mesh, surface })
+        Ok(Model { mesh, surface, hierarchy: None })
     }
 
     /// Relative to the scene's folder, and absolute, so that a written scene finds its files from anywhere.
@@ -342,17 +356,20 @@ impl Resolver<'_> {
         &self,
         file: &mut SceneFile,
         body: &RigidBody,
-        surface: &Surface,
+        model: &Model,
         time_step: f64,
     ) -> Resolved<ContactSettings> {
         let c = &mut file.contact;
-        for (key, value) in
-            [("contact.error_threshold", &mut c.error_threshold), ("contact.friction", &mut c.friction)]
-        {
-            if self.not_negative(key, value, 0.0)? > 0.0 {
-                let text = "is not available yet; contacts are exact and without friction. Set it to 0";
-                return Err(self.source.fault(key, text));
-            }
+        let (_, radius) = model.mesh.bounding_sphere();
+        if self.not_negative("contact.friction", &mut c.friction, 0.0)? > 0.0 {
+            let text = "is not available yet; contacts are without friction. Set it to 0";
+            return Err(self.source.fault("contact.friction", text));
+        }
+        let threshold = self.not_negative("contact.error_threshold", &mut c.error_threshold, 0.0)?;
+        if threshold >= 1.0 {
+            let text =
+                format!("is {threshold}; it is a share of the body's radius, such as 0.025, and 0 is exact");
+            return Err(self.source.fault("contact.error_threshold", text));
         }
         let stiffness = self.positive("contact.stiffness", &mut c.stiffness, 5000.0)?;
         // Half of critical, 0.5 * 2 sqrt(k m): more only raises the impact force (experiments on Fig. 4).
@@ -377,8 +394,9 @@ impl Resolver<'_> {
             stiffness,
             damping,
             tolerance,
+            detail: Detail::threshold(threshold * radius),
             max_clusters: *c.max_clusters.get_or_insert(0),
-            cluster_radius: CLUSTER_RADIUS * surface.radius(),
+            cluster_radius: CLUSTER_RADIUS * model.surface.radius(),
             model: *c.model.get_or_insert(ContactModel::Planes),
             anticipation,
             period: self.positive("contact_thread.period", &mut thread.period, time_step)?,

@@ -4,6 +4,7 @@ use super::Flags;
 use super::command::ContactLaw;
 use super::thinning::{Candidate, thin};
 use crate::scene::{ContactModel, Scene, handle_at};
+use hapteron_collision::clod::{LodWorkspace, query_levels};
 use hapteron_collision::cluster::{ClusterParameters, Clusterer};
 use hapteron_collision::{Contact, QueryWorkspace, query};
 use hapteron_device::DeviceSample;
@@ -166,10 +167,17 @@ pub struct View {
     pub model: ContactModel,
 }
 
+/// Memory of the queries against one obstacle.
+#[derive(Debug, Default)]
+struct Workspace {
+    exact: QueryWorkspace,
+    levels: LodWorkspace,
+}
+
 /// Runs passes; holds what one pass leaves for the next. Not for the haptic thread: it allocates as contacts grow.
 #[derive(Debug)]
 pub struct ContactPass {
-    workspaces: Vec<QueryWorkspace>,
+    workspaces: Vec<Workspace>,
     measuring: Vec<QueryWorkspace>,
     clusterer: Option<Clusterer>,
     contacts: Vec<Contact>,
@@ -184,7 +192,7 @@ impl ContactPass {
         let parameters =
             ClusterParameters { max_clusters: settings.max_clusters, radius: settings.cluster_radius };
         Self {
-            workspaces: scene.obstacles.iter().map(|_| QueryWorkspace::new()).collect(),
+            workspaces: scene.obstacles.iter().map(|_| Workspace::default()).collect(),
             measuring: scene.obstacles.iter().map(|_| QueryWorkspace::new()).collect(),
             clusterer: (settings.max_clusters > 0).then(|| Clusterer::new(parameters)),
             contacts: Vec::new(),
@@ -224,14 +232,25 @@ impl ContactPass {
         self.contacts.clear();
         let mut min_distance = f64::INFINITY;
         for (obstacle, workspace) in scene.obstacles.iter().zip(&mut self.workspaces) {
-            let found = query(
-                &scene.model.surface,
-                &world_from_mesh,
-                &obstacle.model.surface,
-                &obstacle.world_from_mesh,
-                reach,
-                workspace,
-            );
+            let found = match (scene.model.lod(), obstacle.model.lod()) {
+                (Some(body), Some(other)) => query_levels(
+                    body,
+                    &world_from_mesh,
+                    other,
+                    &obstacle.world_from_mesh,
+                    reach,
+                    &settings.detail,
+                    &mut workspace.levels,
+                ),
+                _ => query(
+                    &scene.model.surface,
+                    &world_from_mesh,
+                    &obstacle.model.surface,
+                    &obstacle.world_from_mesh,
+                    reach,
+                    &mut workspace.exact,
+                ),
+            };
             min_distance = min_distance.min(found.min_distance);
             self.contacts.extend_from_slice(found.contacts);
         }
@@ -240,14 +259,18 @@ impl ContactPass {
         snapshot.contacts = self.contacts.len() as u32;
         self.candidates.clear();
         let rotation = state.unit_quaternion();
-        let mut add = |point: &Vector3<f64>, on_obstacle: &Vector3<f64>, normal: Vector3<f64>, depth: f64| {
+        let mut add = |point: &Vector3<f64>,
+                       on_obstacle: &Vector3<f64>,
+                       normal: Vector3<f64>,
+                       depth: f64,
+                       weight: f64| {
             let point_b = rotation.inverse_transform_vector(&(point - state.position));
             let plane = ContactPlane::new(
                 point_b,
                 on_obstacle,
                 normal,
-                law.stiffness,
-                law.damping,
+                weight * law.stiffness,
+                weight * law.damping,
                 settings.tolerance,
             );
             self.candidates.push((depth, plane));
@@ -256,12 +279,12 @@ impl ContactPass {
         if let Some(clusterer) = &mut self.clusterer {
             // What is beyond d has no weight in a cluster; it stays a plane of its own, or a far one would hold a near one off.
             for c in clusterer.update(&self.contacts, d, &world_from_mesh) {
-                add(&c.point_body, &c.point_obstacle, c.normal, c.depth);
+                add(&c.point_body, &c.point_obstacle, c.normal, c.depth, 1.0);
             }
         }
         let alone = |c: &&Contact| settings.max_clusters == 0 || c.depth <= -d;
         for c in self.contacts.iter().filter(alone) {
-            add(&c.point_body, &c.point_obstacle, c.normal, c.depth);
+            add(&c.point_body, &c.point_obstacle, c.normal, c.depth, c.weight);
         }
         let thinned = thin(&mut self.candidates, scene.model.surface.radius(), MAX_PLANES);
         snapshot.fill(&self.candidates, thinned, &view.body, state, view.model);

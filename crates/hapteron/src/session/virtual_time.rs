@@ -115,7 +115,7 @@ impl<'a> VirtualTime<'a> {
 
     /// Signed distance of the surfaces at the newest state, metres; infinite when nothing is closer than the tolerance.
     pub fn min_distance(&mut self) -> f64 {
-        if self.fresh {
+        if self.fresh && self.scene.contact.detail.is_exact() {
             // The pass under way looks at this very state.
             return self.pending.min_distance();
         }
