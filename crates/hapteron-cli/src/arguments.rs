@@ -28,27 +28,57 @@ pub enum Command {
     #[command(after_help = QUERY_EXAMPLES)]
     Query(Query),
     /// Check and describe a mesh
-    #[command(after_help = "Examples:\n  hapteron mesh part.stl\n  hapteron mesh part.stl --scale 0.001\n")]
+    #[command(
+        after_help = "Examples:\n  hapteron mesh part.stl\n  hapteron mesh part.stl --scale 0.001 --build --out levels\n"
+    )]
     Mesh(Mesh),
     /// Two runs side by side: a table and a report
     #[command(after_help = "Example:\n  hapteron compare runs/a runs/b\n")]
     Compare(Compare),
+    /// This machine's figures: step and query times, and how late ticks come
+    #[command(
+        after_help = "Examples:\n  hapteron bench\n  hapteron bench --json --seconds 30 > bench.json\n  hapteron bench --soak 600\n"
+    )]
+    Bench(Bench),
+    /// Supported and attached devices, and what is missing for the others
+    #[command(after_help = "Examples:\n  hapteron devices\n  hapteron devices --json\n")]
+    Devices(Devices),
+    /// Where in the plane of two scene keys a simulated hand can hold the object: a map
+    #[command(after_help = STABILITY_EXAMPLES)]
+    Stability(Stability),
     /// Write the built-in meshes and scenes into a folder, to start one's own from
     #[command(
         after_help = "Example:\n  hapteron models my-models\n  hapteron run my-models/spoon_in_cup.toml --virtual-time\n"
     )]
     Models(Models),
+    /// See and feel a scene in a window: 3D view, plots, sliders; pointer and keys stand in for a haptic device
+    #[command(after_help = LIVE_EXAMPLES)]
+    Live(Live),
 }
 
+const LIVE_EXAMPLES: &str = "Examples:
+  hapteron live                      the start page
+  hapteron live --scene jaws         a built-in scene: jaws, spoon_in_cup, spoon_in_free_space
+  hapteron live my-scene.toml
+  hapteron live --scene jaws --screenshot jaws.png --after 5
+";
+
 const RUN_EXAMPLES: &str = "Examples:
-  hapteron run scene.toml --virtual-time
+  hapteron run scene.toml
   hapteron run scene.toml --virtual-time --replay hand.csv --out result
+  hapteron run result/scene.toml --replay result/device.csv --set contact.stiffness=2000 --out other
   hapteron run scene.toml --virtual-time --set coupling.linear_stiffness=500 --set integrator.method=runge-kutta-4
+";
+
+const STABILITY_EXAMPLES: &str = "Examples:
+  hapteron stability scene.toml --x body.mass=0.001:0.1:7 --y coupling.linear_stiffness=100:5000:8
+  hapteron stability scene.toml --x hand.grip=released,light,medium,firm --y contact.stiffness=2000:10000:5 --set device.delay=2
 ";
 
 const QUERY_EXAMPLES: &str = "Examples:
   hapteron query body.obj obstacle.obj --poses poses.csv --tolerance 0.001
   hapteron query body.stl obstacle.stl --poses poses.csv --tolerance 0.0002 --contacts contacts.csv --rate
+  hapteron query body.stl obstacle.stl --poses poses.csv --tolerance 0.0002 --error-threshold 0.025 --rate
 ";
 
 /// `hapteron demo`
@@ -57,6 +87,12 @@ pub struct Demo {
     /// Folder for the results [default: runs/demo, numbered when it exists]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Seconds [default: 10]
+    #[arg(long, value_name = "S")]
+    pub duration: Option<f64>,
+    /// Run on the deterministic schedule, as fast as the machine can
+    #[arg(long)]
+    pub virtual_time: bool,
 }
 
 /// `hapteron run`
@@ -65,16 +101,40 @@ pub struct Run {
     /// The scene (TOML)
     #[arg(value_name = "SCENE.toml")]
     pub scene: PathBuf,
-    /// Run on the deterministic schedule, as fast as the machine can (the only way until real devices are supported)
+    /// Run on the deterministic schedule, as fast as the machine can, instead of in real time
     #[arg(long)]
     pub virtual_time: bool,
-    /// Let the handle follow this motion exactly (t,px,py,pz,qw,qx,qy,qz) instead of the scene's hand
+    /// End after so many seconds [default: with the scene's motion]
+    #[arg(long, value_name = "S")]
+    pub duration: Option<f64>,
+    /// Let the handle follow this motion exactly (t,px,py,pz,qw,qx,qy,qz) instead of the scene's hand; or make a session again from its device.csv
+    /// (in virtual time; the same bits, or what they would have been under --set)
     #[arg(long, value_name = "T.csv")]
     pub replay: Option<PathBuf>,
     /// Override a key of the scene, as in contact.stiffness=2000; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
     /// Folder for the results [default: runs/NAME, numbered when it exists]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// `hapteron stability`
+#[derive(Args, Debug)]
+pub struct Stability {
+    /// The scene (TOML); without a hand it is held with a medium grip
+    #[arg(value_name = "SCENE.toml")]
+    pub scene: PathBuf,
+    /// The key to the right with its range, as in body.mass=0.001:0.1:7, or values, as in hand.grip=light,firm
+    #[arg(long, value_name = "KEY=LO:HI:N")]
+    pub x: String,
+    /// The key upward, written like --x
+    #[arg(long, value_name = "KEY=LO:HI:N")]
+    pub y: String,
+    /// Override a key of the scene for all cells; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+    /// Folder for the results [default: runs/stability-NAME, numbered when it exists]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
@@ -100,6 +160,10 @@ pub struct Query {
     /// Metres per unit of both meshes
     #[arg(long, default_value_t = 1.0, value_name = "S")]
     pub scale: f64,
+    /// Contacts may be as coarse as this share of A's radius, such as 0.025; each then has a weight, the number of vertices
+    /// that it stands for. 0 is exact
+    #[arg(long, default_value_t = 0.0, value_name = "S")]
+    pub error_threshold: f64,
     /// Tell on stderr how long the queries took
     #[arg(long)]
     pub rate: bool,
@@ -114,6 +178,15 @@ pub struct Mesh {
     /// Metres per unit of the mesh
     #[arg(long, default_value_t = 1.0, value_name = "S")]
     pub scale: f64,
+    /// Make and cache the contact levels of detail, print them, and draw them in a report
+    #[arg(long)]
+    pub build: bool,
+    /// With --build: folder for the report [default: runs/mesh, numbered when it exists]
+    #[arg(long, value_name = "DIR", requires = "build")]
+    pub out: Option<PathBuf>,
+    /// With --build: folder of the cache [default: hapteron in the user's cache folder]
+    #[arg(long, value_name = "DIR", requires = "build")]
+    pub cache: Option<PathBuf>,
 }
 
 /// `hapteron compare`
@@ -128,6 +201,28 @@ pub struct Compare {
     /// Folder for the report [default: runs/compare, numbered when it exists]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// `hapteron bench`
+#[derive(Args, Debug)]
+pub struct Bench {
+    /// As JSON
+    #[arg(long)]
+    pub json: bool,
+    /// How long each of the two loops runs
+    #[arg(long, default_value_t = 10.0, value_name = "N")]
+    pub seconds: f64,
+    /// Instead: a session for so many seconds, and whether it leaks memory or drifts
+    #[arg(long, value_name = "SECONDS")]
+    pub soak: Option<f64>,
+}
+
+/// `hapteron devices`
+#[derive(Args, Debug)]
+pub struct Devices {
+    /// The same as JSON (SI units; null is a limit that is not known)
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `hapteron models`
@@ -158,4 +253,51 @@ pub enum Figure {
     Fig4,
     /// The jaws: the linearized contact model and slow contact threads
     Fig6,
+}
+
+/// `hapteron live`
+#[derive(Args, Debug)]
+#[cfg_attr(not(feature = "window"), allow(dead_code))]
+pub struct Live {
+    /// The scene (TOML) [default: the start page]
+    #[arg(value_name = "SCENE.toml")]
+    pub file: Option<PathBuf>,
+    /// A built-in scene instead of a file
+    #[arg(long, value_name = "NAME", conflicts_with = "file", value_parser = hapteron::scenes::NAMES)]
+    pub scene: Option<String>,
+    /// Bright surroundings [default: as the system]
+    #[arg(long, conflicts_with = "dark")]
+    pub light: bool,
+    /// Dark surroundings [default: as the system]
+    #[arg(long)]
+    pub dark: bool,
+    /// Width and height of the window, points [default: 1280x800]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[f32; 2]>,
+    /// Save a picture of the window (PNG) and close
+    #[arg(long, value_name = "FILE")]
+    pub screenshot: Option<PathBuf>,
+    /// When to take the picture, seconds [default: 3]; without --screenshot: when to close
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub after: Option<f64>,
+    /// Write where buttons and values are (name,left,top,right,bottom; pixels), for scripts that drive the window
+    #[arg(long, value_name = "FILE")]
+    pub widgets: Option<PathBuf>,
+}
+
+/// A time that a person can wait for.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=1e6).contains(&seconds) => Ok(seconds),
+        _ => Err("must be a number of seconds, not negative".to_owned()),
+    }
+}
+
+/// Width and height, as in 1280x800.
+fn size(text: &str) -> Result<[f32; 2], String> {
+    let parse = |word: &str| word.parse::<f32>().ok().filter(|n| (100.0..=10_000.0).contains(n));
+    match text.split_once('x').map(|(w, h)| (parse(w), parse(h))) {
+        Some((Some(width), Some(height))) => Ok([width, height]),
+        _ => Err("must be width and height as in 1280x800, each from 100 to 10000".to_owned()),
+    }
 }

@@ -22,7 +22,11 @@ fn main() -> ExitCode {
         Command::Query(a) => commands::query::query(&a),
         Command::Mesh(a) => commands::mesh::mesh(&a),
         Command::Compare(a) => commands::compare::compare(&a),
+        Command::Bench(a) => commands::bench::bench(&a),
+        Command::Devices(a) => commands::devices::devices(&a),
+        Command::Stability(a) => commands::stability::stability(&a),
         Command::Models(a) => commands::models::models(&a),
+        Command::Live(a) => commands::live::live(&a),
     };
     match outcome {
         Ok(code) => code,

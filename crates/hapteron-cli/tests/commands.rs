@@ -173,3 +173,54 @@ fn bad_input_gets_a_clear_error() {
     fails(&folder, 2, &["run"], &["SCENE.toml"]);
     fails(&folder, 2, &["rum"], &["run"]);
 }
+
+/// Would catch a Ctrl-C that loses the files, or a session that does not end.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_a_session_with_complete_files() {
+    use std::io::Read;
+    use std::process::{Command, Stdio};
+    let folder = Folder::new("interrupt");
+    hapteron(&folder, &["models", "m"]);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_hapteron"))
+        .args(["run", "m/spoon_in_cup.toml", "--duration", "600", "--out", "r"])
+        .current_dir(folder.path())
+        .stderr(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut errors = child.stderr.take().unwrap();
+    let mut begun = [0; 14];
+    errors.read_exact(&mut begun).unwrap();
+    assert_eq!(&begun, b"haptic thread:");
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let told = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(told.success());
+    let mut rest = String::new();
+    errors.read_to_string(&mut rest).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1), "{rest}");
+    assert!(rest.contains("stopped after"), "{rest}");
+    let rows = folder.read("r/run.csv").lines().count();
+    assert!(rows > 10 && folder.read("r/device.csv").lines().count() == rows + 1, "{rows}");
+    assert!(
+        folder.read("r/report.html").ends_with("</html>\n")
+            && folder.read("r/timing.json").contains("\"stopped\"")
+    );
+    let again = hapteron(&folder, &["run", "r/scene.toml", "--replay", "r/device.csv", "--out", "again"]);
+    assert!(again.status.success(), "{}", stderr(&again));
+    assert!(folder.read("again/run.csv") == folder.read("r/run.csv"));
+}
+
+/// Would catch a scene for a real device that asks for a motion, and a driver's error without its cure.
+#[test]
+fn a_scene_with_a_driver_needs_no_motion_but_its_device() {
+    let folder = Folder::new("driver");
+    folder.file(
+        "s.toml",
+        "[body]\nmesh = \"builtin:spoon\"\nmass = 0.01\n[device]\nkind = \"haply\"\n[device.options]\naddress = \"127.0.0.1:1\"\n",
+    );
+    fails(&folder, 1, &["run", "s.toml", "--out", "r"], &["127.0.0.1:1"]);
+    fails(&folder, 1, &["run", "s.toml", "--virtual-time"], &["[hand] trajectory"]);
+    fails(&folder, 1, &["run", "s.toml", "--set", "device.kind=\"haplee\""], &["did you mean 'haply'"]);
+    fails(&folder, 1, &["run", "s.toml", "--duration=-1"], &["positive number of seconds"]);
+}

@@ -29,16 +29,49 @@ fn assert_self_contained(html: &str, plots: usize, pictures: usize) {
     assert_eq!(found, plots);
 }
 
-/// Would catch a demo that fails, forgets to say that it is in virtual time, or shows a scene without contact.
+/// Would catch a demo that fails, shows a scene without contact, or a session that does not come again from its log bit for bit.
 #[test]
-fn demo_shows_the_jaws_in_contact() {
+fn demo_in_real_time_comes_again_from_its_log() {
     let folder = Folder::new("demo");
-    let output = hapteron(&folder, &["demo"]);
+    let output = hapteron(&folder, &["demo", "--duration", "2"]);
+    let text = stdout(&output);
+    assert!(
+        text.contains("in real time") && text.contains("runs/demo/report.html"),
+        "{}{text}",
+        stderr(&output)
+    );
+    assert!(text.contains("a bare loop between the ticks"), "{text}");
+    assert_self_contained(&folder.read("runs/demo/report.html"), 7 + 2 + 3, 3);
+    let timing: serde_json::Value = serde_json::from_str(&folder.read("runs/demo/timing.json")).unwrap();
+    let (ticks, missed) = (timing["ticks"].as_u64().unwrap(), timing["missed_deadlines"].as_u64().unwrap());
+    assert_eq!(
+        (timing["end"].as_str(), timing["records_lost"].as_u64()),
+        (Some("the time was over"), Some(0))
+    );
+    // Deadlines after the last tick are nobody's.
+    assert!((1900..=2000).contains(&(ticks + missed)), "{ticks} ticks, {missed} missed");
+    assert_eq!(timing["nanoseconds"]["compute"]["count"].as_u64(), Some(ticks));
+
+    let log = ["--replay", "runs/demo/device.csv"];
+    hapteron(&folder, &[&["run", "runs/demo/scene.toml", "--out", "again"], &log[..]].concat());
+    assert!(folder.read("again/run.csv") == folder.read("runs/demo/run.csv"), "made again it is different");
+    let soft = ["run", "runs/demo/scene.toml", "--set", "contact.stiffness=1000", "--out", "soft"];
+    let output = hapteron(&folder, &[&soft[..], &log[..]].concat());
+    assert!(stdout(&output).contains("a session made again"), "{}", stderr(&output));
+    let output = hapteron(&folder, &["compare", "runs/demo", "soft"]);
+    let rms = stdout(&output);
+    let rms = rms.lines().find(|l| l.starts_with("rms difference of body")).unwrap();
+    assert!(!rms.ends_with(" 0.0000 mm"), "{rms}");
+}
+
+/// Would catch a demo whose jaws do not touch, sink in, or shake in the hand.
+#[test]
+fn demo_in_virtual_time_holds_the_jaws_closed() {
+    let folder = Folder::new("demo-virtual");
+    let output = hapteron(&folder, &["demo", "--virtual-time", "--duration", "2.5"]);
     assert!(output.status.success(), "{}", stderr(&output));
-    assert!(stderr(&output).contains("virtual time"), "{}", stderr(&output));
-    assert!(stdout(&output).contains("stable") && stdout(&output).contains("runs/demo/report.html"));
+    assert!(stdout(&output).contains("virtual time, stable"), "{}", stdout(&output));
     assert!(stdout(&output).contains("never crossed"), "{}", stdout(&output));
-    assert_self_contained(&folder.read("runs/demo/report.html"), 7, 3);
 }
 
 /// Would catch an experiment of the paper that no longer comes out, or a report without it.

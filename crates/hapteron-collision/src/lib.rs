@@ -5,6 +5,7 @@
 //! never lives here: forces, states, time, threads. All of it belongs to the contact thread or to set-up; nothing here is
 //! meant for the haptic thread.
 
+pub mod clod;
 pub mod cluster;
 mod contact;
 pub mod mesh;

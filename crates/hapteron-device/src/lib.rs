@@ -1,15 +1,20 @@
 //! What a haptic device is to the rest: it gives samples of its handle and takes commands.
 //!
-//! Here live the sample and the command, the scaling between the device's workspace and the virtual world, and the hand
-//! that stands in for a person. What never lives here: meshes, the dynamics of the body, files. SI units, world axes.
+//! Here live the sample and the command, the scaling between the device's workspace and the virtual world, the guard of the
+//! output, simulated devices with the hand that stands in for a person, and the drivers of real ones. What never lives here: meshes, the dynamics of the body, files. SI units, world axes.
 
 mod device;
+pub mod drivers;
+pub mod guard;
 mod hand;
 mod scaling;
+pub mod simulated;
+mod undeliverable;
 
 pub use device::{Applied, Capabilities, Control, Device, DeviceFault, Pacing};
-pub use hand::{Hand, HandError, HandParameters};
+pub use hand::{GRIP_RADIUS, Grip, HandError, HandParameters, Tremor};
 pub use scaling::{Scaling, ScalingError};
+pub use undeliverable::undeliverable;
 
 use nalgebra::{UnitQuaternion, Vector3};
 

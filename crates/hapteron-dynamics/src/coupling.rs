@@ -178,6 +178,84 @@ impl Coupling {
         self.angular.stiffness
     }
 
+    /// The springs of translation and rotation, and their dampings (N s/m, N m s/rad).
+    #[must_use]
+    pub fn springs(&self) -> ([Spring; 2], [f64; 2]) {
+        ([self.linear, self.angular], [self.linear_damping, self.angular_damping])
+    }
+
+    /// The grasp: the coupling point in the body frame (from the centre of mass, metres), and coupling frame to body frame.
+    #[must_use]
+    pub fn grasp(&self) -> (Vector3<f64>, UnitQuaternion<f64>) {
+        (self.grasp_position_b, self.grasp_orientation_b)
+    }
+
+    /// The same springs and dampers, grasped where the handle is now: with no deviation.  Section 5.1.
+    ///
+    /// Requires a finite handle and a unit quaternion. Real time: constant work.
+    #[must_use]
+    pub fn grasped(&self, handle: &Handle, state: &State) -> Self {
+        let inverse = state.unit_quaternion().inverse();
+        Self {
+            grasp_position_b: inverse * (handle.position - state.position),
+            grasp_orientation_b: UnitQuaternion::new_normalize((inverse * handle.orientation).into_inner()),
+            ..*self
+        }
+    }
+
+    /// These springs and dampers at another grasp, as [`Coupling::grasp`] gives it. Real time: constant work.
+    #[must_use]
+    pub fn with_grasp(&self, position_b: Vector3<f64>, orientation_b: UnitQuaternion<f64>) -> Self {
+        Self { grasp_position_b: position_b, grasp_orientation_b: orientation_b, ..*self }
+    }
+
+    /// Springs and dampers on the way to another coupling's, at this grasp: `share` 0 gives these, 1 the other's. A limit that one of
+    /// them does not have comes from, or goes to, infinity. Real time: constant work.
+    #[must_use]
+    pub fn toward(&self, other: &Self, share: f64) -> Self {
+        let mix = |a: f64, b: f64| a + (b - a) * share;
+        let limit = |a: Option<f64>, b: Option<f64>| match (a, b) {
+            (Some(a), Some(b)) => Some(mix(a, b)),
+            (None, Some(b)) => (share > 0.0).then(|| b / share),
+            (Some(a), None) => (share < 1.0).then(|| a / (1.0 - share)),
+            (None, None) => None,
+        };
+        let spring = |a: Spring, b: Spring| Spring {
+            stiffness: mix(a.stiffness, b.stiffness),
+            limit: limit(a.limit, b.limit).filter(|l| l.is_finite()),
+        };
+        Self {
+            linear: spring(self.linear, other.linear),
+            angular: spring(self.angular, other.angular),
+            linear_damping: mix(self.linear_damping, other.linear_damping),
+            angular_damping: mix(self.angular_damping, other.angular_damping),
+            ..*self
+        }
+    }
+
+    /// The same grasp without springs and dampers: an open hand. Real time: constant work.
+    #[must_use]
+    pub fn released(&self) -> Self {
+        let none = Spring { stiffness: 0.0, limit: None };
+        Self { linear: none, angular: none, linear_damping: 0.0, angular_damping: 0.0, ..*self }
+    }
+
+    /// The handle that the coupling has no deviation from: at x + R c, turned by q q_c, and moving with the body.
+    ///
+    /// Requires a unit quaternion. Real time: constant work.
+    #[must_use]
+    pub fn without_deviation(&self, state: &State, body: &RigidBody) -> Handle {
+        let rotation = state.unit_quaternion();
+        let arm = rotation * self.grasp_position_b;
+        let omega = state.angular_velocity(body);
+        Handle {
+            position: state.position + arm,
+            orientation: rotation * self.grasp_orientation_b,
+            linear_velocity: state.linear_velocity(body) + omega.cross(&arm),
+            angular_velocity: omega,
+        }
+    }
+
     fn deviation<T: RealField + Copy>(
         &self,
         handle: &Handle,

@@ -138,7 +138,7 @@ impl WayPoints {
 }
 
 /// Motions that [`builtin`] knows.
-pub const BUILTIN_NAMES: [&str; 3] = ["free-space", "spoon-in-cup", "chewing"];
+pub const BUILTIN_NAMES: [&str; 4] = ["free-space", "spoon-in-cup", "chewing", "holding"];
 
 /// A built-in motion by its name, at every `dt`, in the world of the built-in scene that uses it.
 ///
@@ -154,6 +154,10 @@ pub fn builtin(name: &str, dt: f64) -> Result<Trajectory, TrajectoryError> {
         "chewing" => {
             let world_from_motion = Isometry3::from(Translation3::from(crate::scenes::JAW_GRIP));
             chewing().trajectory(dt, &world_from_motion)
+        }
+        "holding" => {
+            let world_from_motion = Isometry3::from(Translation3::from(crate::scenes::JAW_GRIP));
+            holding().trajectory(dt, &world_from_motion)
         }
         _ => Err(TrajectoryError {
             file: format!("builtin:{name}"),
@@ -203,6 +207,30 @@ fn chewing() -> WayPoints {
     channels[3] = vec![(0.26, 0.0), (0.42, 0.02), (0.60, -0.02), (0.76, 0.0)];
     channels[5] = vec![(0.24, 0.0), (0.40, 0.03), (0.58, -0.03), (0.76, 0.0)];
     WayPoints { channels, duration: 0.9 }
+}
+
+/// The hand of the demonstration: 10 s. It closes the jaws, holds them closed, grinds slowly to either side, taps, holds, and opens them.
+fn holding() -> WayPoints {
+    let mut channels: [Vec<(f64, f64)>; 6] = Default::default();
+    let (open, light, firm) = (crate::scenes::JAW_OPENING, -0.0025, -0.0040);
+    channels[0] = vec![(2.5, 0.0), (3.4, 0.0030), (5.0, -0.0030), (6.0, 0.0)];
+    channels[1] = vec![(2.8, 0.0), (3.9, 0.0012), (5.3, -0.0012), (6.2, 0.0)];
+    channels[2] = vec![
+        (0.2, open),
+        (0.8, light),
+        (1.6, firm),
+        (2.4, light),
+        (6.2, light),
+        (6.6, open),
+        (7.0, light),
+        (7.4, open),
+        (7.8, firm),
+        (9.2, firm),
+        (9.8, open),
+    ];
+    channels[3] = vec![(2.6, 0.0), (3.5, 0.02), (5.1, -0.02), (6.1, 0.0)];
+    channels[5] = vec![(2.5, 0.0), (3.3, 0.03), (4.8, -0.03), (6.1, 0.0)];
+    WayPoints { channels, duration: 10.0 }
 }
 
 fn between(points: &[(f64, f64)], t: f64) -> f64 {

@@ -2,6 +2,7 @@
 
 use crate::scene::Scene;
 use crate::session::{ContactSnapshot, Flags, Tick};
+use hapteron_dynamics::RigidBody;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::io::{self, Write};
 use std::path::Path;
@@ -95,22 +96,36 @@ impl Row {
     /// A tick's row.
     #[must_use]
     pub fn new(scene: &Scene, time: f64, tick: &Tick, penetration: f64, contacts: &ContactSnapshot) -> Self {
+        let counts = (contacts.contacts(), contacts.clusters());
+        Self::of_body(scene, &scene.body, time, tick, penetration, counts)
+    }
+
+    /// A tick's row with a body whose mass is not the scene's, and the numbers of contacts and of planes.
+    #[must_use]
+    pub fn of_body(
+        scene: &Scene,
+        of: &RigidBody,
+        time: f64,
+        tick: &Tick,
+        penetration: f64,
+        counts: (u32, u32),
+    ) -> Self {
         let state = &tick.step.state;
         let body = scene.world_from_mesh(state);
-        let omega = state.angular_velocity(&scene.body);
+        let omega = state.angular_velocity(of);
         let arm = body.translation.vector - state.position;
         Self {
             time,
             handle: Isometry3::from_parts(tick.handle.position.into(), tick.handle.orientation),
             body,
-            body_velocity: [state.linear_velocity(&scene.body) + omega.cross(&arm), omega],
+            body_velocity: [state.linear_velocity(of) + omega.cross(&arm), omega],
             coupling: [tick.step.coupling.force, tick.step.coupling.torque],
             contact: [tick.step.contact.force, tick.step.contact.torque],
             feedback: [tick.command.force, tick.command.torque],
             deviation: tick.step.deviation,
             penetration,
-            contacts: contacts.contacts(),
-            clusters: contacts.clusters(),
+            contacts: counts.0,
+            clusters: counts.1,
             contact_age: tick.contact_age,
             flags: tick.flags,
         }
@@ -293,7 +308,7 @@ impl Recording {
                 })?;
             }
             let row = Row::from_numbers(&numbers);
-            if row.flags.contains(Flags::FAULT_LATCHED) && recording.fault_time.is_none() {
+            if row.flags.no_force() && recording.fault_time.is_none() {
                 recording.fault_time = Some(row.time);
             }
             recording.rows.push(row);

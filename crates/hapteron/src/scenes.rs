@@ -1,7 +1,8 @@
 //! The scenes that come with the library: those of the paper's section 7.
 
 use crate::scene::file::{
-    Body, Contact, ContactThread, Coupling, Device, General, Hand, Integrator, Method, Obstacle, SceneFile,
+    Body, Contact, ContactThread, Coupling, Device, General, Grip, Hand, Integrator, Method, Obstacle,
+    SceneFile,
 };
 
 /// Inertia of the paper's spoon for one kilogram, about its centre of mass, m^2 (x along it, z up).
@@ -72,7 +73,7 @@ pub fn spoon_in_cup(mass: f64, stiffness: f64, method: Method) -> SceneFile {
             max_clusters: Some(8),
             ..Contact::default()
         },
-        contact_thread: ContactThread { period: Some(1e-3), latency: Some(0.0) },
+        contact_thread: ContactThread { period: Some(1e-3), latency: Some(0.0), ..ContactThread::default() },
         hand: Hand { trajectory: Some("builtin:spoon-in-cup".to_owned()), ..Hand::default() },
         ..spoon_in_free_space(mass, method)
     }
@@ -102,10 +103,18 @@ pub fn jaws() -> SceneFile {
             ..Coupling::default()
         },
         contact: Contact { stiffness: Some(5e3), tolerance: Some(5e-4), ..Contact::default() },
-        device: Device { position_scale: Some(0.4) },
+        device: Device { position_scale: Some(0.4), ..Device::default() },
         hand: Hand { trajectory: Some("builtin:chewing".to_owned()), ..Hand::default() },
         ..SceneFile::default()
     }
+}
+
+/// The demonstration: the jaws of [`jaws`] held closed for 10 s by a hand that feels the force and yields to it.
+#[must_use]
+pub fn demo() -> SceneFile {
+    let hand =
+        Hand { trajectory: Some("builtin:holding".to_owned()), grip: Some(Grip::Medium), ..Hand::default() };
+    SceneFile { scene: named("jaws held in a hand"), hand, ..jaws() }
 }
 
 fn named(name: &str) -> General {

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use hapteron::device::DeviceSample;
+use hapteron::device::guard::{Guard, GuardSettings, GuardStatus};
 use hapteron::scene::file::{ContactModel, Method};
 use hapteron::scene::{Scene, SceneFile};
 use hapteron::scenes::spoon_in_cup;
@@ -104,4 +105,32 @@ fn the_device_gets_the_scaled_force_and_the_world_the_scaled_motion() {
     let b = tick(&Settings::of(&scaled), &start, &device, &contacts, 0.001);
     assert!((b.command.force - a.command.force / 0.4).norm() < 1e-12);
     assert!((b.command.torque - a.command.torque / 0.16).norm() < 1e-12);
+}
+
+/// Would catch a tick whose command bypasses the guard, or whose guard does not hear of a fault of the simulation.
+#[test]
+fn the_guard_is_the_last_to_touch_the_command() {
+    // The hand carries the body's weight, 0.29 N.
+    let scene = scene(|file| file.scene.gravity = Some([0.0, 0.0, -29.0]));
+    let settings = Settings::of(&scene);
+    let contacts = ContactSnapshot::empty(&scene.body, &scene.start);
+    let limits = GuardSettings { ramp_time: 1e-3, ..GuardSettings::within(0.05, 0.1, 1e-3) };
+    let mut haptic = HapticState::guarded(scene.start, Guard::new(limits).unwrap());
+    let rest = scene.trajectory.sample(0.0, 1e-3);
+    let mut last = None;
+    for i in 1..=50u32 {
+        let now = f64::from(i) * 1e-3;
+        let result = tick(&settings, &haptic, &DeviceSample { time: now, ..rest }, &contacts, now);
+        assert!(result.command.force.norm() <= 0.05 + 1e-12);
+        assert!(i < 30 || result.flags.contains(Flags::from_guard(GuardStatus::LIMITED)), "{i}");
+        assert!(i < 30 || result.step.feedback.force.norm() > 0.2, "the test needs a force beyond the limit");
+        haptic = result.after;
+        last = Some(result.command.force);
+    }
+    let nan = DeviceSample { position: Vector3::repeat(f64::NAN), time: 0.051, ..rest };
+    let first = tick(&settings, &haptic, &nan, &contacts, 0.051);
+    assert!(first.flags.contains(Flags::GUARD_FAULT) && first.flags.contains(Flags::FAULT_LATCHED));
+    assert_eq!(first.command.force, last.unwrap() * 0.5, "half in the first tick");
+    let second = tick(&settings, &first.after, &DeviceSample { time: 0.052, ..rest }, &contacts, 0.052);
+    assert_eq!(second.command, hapteron::device::DeviceCommand::zero(), "none in the second");
 }

@@ -75,6 +75,16 @@ fn table(runs: &[Recording; 2]) -> Vec<Compared> {
     ]
 }
 
+/// Rows of the same time: a run in real time lacks the ticks that were missed.
+fn pairs(runs: &[Recording; 2]) -> impl Iterator<Item = (&Row, &Row)> {
+    let half_step = runs[0].rows.windows(2).map(|w| w[1].time - w[0].time).fold(1e-3, f64::min) / 2.0;
+    let mut second = runs[1].rows.iter().peekable();
+    runs[0].rows.iter().filter_map(move |a| {
+        while second.next_if(|b| b.time < a.time - half_step).is_some() {}
+        second.peek().filter(|b| b.time <= a.time + half_step).map(|b| (a, *b))
+    })
+}
+
 /// Over the ticks that both runs have.
 fn difference(
     runs: &[Recording; 2],
@@ -82,9 +92,8 @@ fn difference(
     unit: &str,
     value: &dyn Fn(&Row) -> nalgebra::Vector3<f64>,
 ) -> Compared {
-    let pairs = || runs[0].rows.iter().zip(&runs[1].rows);
-    let sum: f64 = pairs().map(|(a, b)| (value(a) - value(b)).norm_squared()).sum();
-    let rms = (sum / pairs().count().max(1) as f64).sqrt();
+    let sum: f64 = pairs(runs).map(|(a, b)| (value(a) - value(b)).norm_squared()).sum();
+    let rms = (sum / pairs(runs).count().max(1) as f64).sqrt();
     Compared { what, values: [String::new(), String::new()], difference: format!("{rms:.4} {unit}") }
 }
 

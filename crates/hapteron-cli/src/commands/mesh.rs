@@ -1,6 +1,7 @@
 //! `hapteron mesh`: what a mesh is like, and what is wrong with it.
 
 use crate::arguments::Mesh;
+use crate::commands::levels::levels;
 use anyhow::{Result, ensure};
 use hapteron::assets;
 use hapteron::collision::Surface;
@@ -36,6 +37,9 @@ pub fn mesh(arguments: &Mesh) -> Result<ExitCode> {
     let bytes = surface.memory_bytes();
     let each = bytes as f64 / surface.triangle_count().max(1) as f64;
     writeln!(out, "query structure    {:.2} MB ({each:.0} bytes a triangle)", bytes as f64 / 1e6)?;
+    if arguments.build {
+        levels(arguments, &surface, &mut out)?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 

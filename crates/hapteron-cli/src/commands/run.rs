@@ -1,31 +1,64 @@
 //! `hapteron run`: a scene from its start to its end, and the run folder.
 
+use super::real_time::{self, Plan};
 use crate::arguments::Run;
 use crate::progress;
-use crate::report;
+use crate::report::{self, Outcome, Time};
 use anyhow::{Context, Result, bail};
 use hapteron::recording::{Recording, Summary};
 use hapteron::scene::{Changes, Scene};
-use hapteron::session::{ContactPass, run_virtual};
-use std::io::Write;
+use hapteron::session::log::Log;
+use hapteron::session::{ContactPass, replay, run_virtual_for};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 /// Runs the command.
 pub fn run(arguments: &Run) -> Result<ExitCode> {
-    let changes = Changes { overrides: arguments.overrides.clone(), replay: arguments.replay.clone() };
+    let log = arguments.replay.as_deref().filter(|path| is_log(path));
+    // A log is no trajectory: it has the device's samples, the contact schedule and the commands of a session.
+    let trajectory = if log.is_some() { None } else { arguments.replay.clone() };
+    let changes = Changes { overrides: arguments.overrides.clone(), replay: trajectory };
     let scene = Scene::load(&arguments.scene, &changes)?;
-    if !arguments.virtual_time {
-        eprintln!("note: real devices are not supported yet; running in virtual time");
-    }
+    let duration = checked(arguments.duration)?;
     let default =
         arguments.scene.file_stem().map_or_else(|| "run".into(), |s| s.to_string_lossy().into_owned());
     let folder = match &arguments.out {
         Some(folder) => folder.clone(),
         None => free_folder(&default),
     };
-    run_into(&scene, &folder)
+    if let Some(path) = log {
+        return replay_into(&scene, path, &folder);
+    }
+    if arguments.virtual_time && scene.file.hand.trajectory.is_none() {
+        bail!(
+            "in virtual time there is no real device; the scene needs [hand] trajectory, or give --replay FILE"
+        );
+    }
+    if arguments.virtual_time {
+        return run_into(&scene, duration, &folder);
+    }
+    let recorded_motion = arguments.replay.is_some();
+    let plan = Plan { duration, bare: false, repeat: false, recorded_motion };
+    real_time::run_into(scene, &plan, &folder)
+}
+
+/// A number of seconds that a run can have.
+pub fn checked(duration: Option<f64>) -> Result<Option<f64>> {
+    match duration {
+        Some(seconds) if !(seconds > 0.0 && seconds.is_finite()) => {
+            bail!("--duration {seconds}: it must be a positive number of seconds")
+        }
+        duration => Ok(duration),
+    }
+}
+
+/// Whether a file is the log of a session; one that cannot be read is not, and says so later.
+fn is_log(path: &Path) -> bool {
+    let mut start = [0; 256];
+    let read = std::fs::File::open(path).and_then(|mut f| f.read(&mut start));
+    read.is_ok_and(|n| Log::is_log(&start[..n]))
 }
 
 /// `runs/NAME`, or `runs/NAME-2` and so on: a run never overwrites another unless told to.
@@ -35,8 +68,36 @@ pub fn free_folder(name: &str) -> PathBuf {
     std::iter::once(first).chain(numbered).find(|p| !p.exists()).unwrap_or_else(|| Path::new("runs").into())
 }
 
-/// Runs a scene and writes the run folder; fails when the run was not stable.
-pub fn run_into(scene: &Scene, folder: &Path) -> Result<ExitCode> {
+/// Runs a scene in virtual time and writes the run folder; fails when the run was not stable.
+pub fn run_into(scene: &Scene, duration: Option<f64>, folder: &Path) -> Result<ExitCode> {
+    let notes = begin(scene, folder)?;
+    let duration = duration.unwrap_or_else(|| scene.duration());
+    let started = Instant::now();
+    let recording = record(scene, scene.name(), duration)?;
+    let wall = started.elapsed().as_secs_f64();
+    let outcome = Outcome { scene, recording: &recording, time: Time::Virtual { wall, replayed: false } };
+    finish(&outcome, duration, &notes, folder)
+}
+
+/// Makes the ticks of a session's log again and writes the run folder.
+fn replay_into(scene: &Scene, path: &Path, folder: &Path) -> Result<ExitCode> {
+    let log = Log::load(path, scene)?;
+    let notes = begin(scene, folder)?;
+    progress::catch_interrupt();
+    let bar = progress::bar(1000, scene.name());
+    let started = Instant::now();
+    let recording = replay(scene, &log, &mut |share| {
+        bar.set_position((share * 1000.0) as u64);
+        !progress::interrupted()
+    })?;
+    bar.finish_and_clear();
+    let wall = started.elapsed().as_secs_f64();
+    let outcome = Outcome { scene, recording: &recording, time: Time::Virtual { wall, replayed: true } };
+    finish(&outcome, log.rows.last().map_or(0.0, |r| r.time), &notes, folder)
+}
+
+/// Makes the folder, and tells what a user should know of the scene.
+pub fn begin(scene: &Scene, folder: &Path) -> Result<Vec<String>> {
     // Before the run, so that a folder that cannot be written is known at once.
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
@@ -44,16 +105,19 @@ pub fn run_into(scene: &Scene, folder: &Path) -> Result<ExitCode> {
     for note in &notes {
         eprintln!("warning: {note}");
     }
-    let started = Instant::now();
-    let recording = record(scene, scene.name())?;
-    let wall = started.elapsed().as_secs_f64();
-    write_folder(scene, &recording, wall, &notes, folder)?;
+    Ok(notes)
+}
+
+/// Writes `run.csv`, `scene.toml` and `report.html`, and the summary on stdout. `duration` is what the run was to last.
+pub fn finish(outcome: &Outcome<'_>, duration: f64, notes: &[String], folder: &Path) -> Result<ExitCode> {
+    let Outcome { scene, recording, .. } = outcome;
+    write_folder(outcome, notes, folder)?;
     let summary = recording.summary();
     let mut out = std::io::stdout().lock();
-    print_summary(&mut out, scene, &recording, &summary, wall)?;
+    print_summary(&mut out, outcome, &summary)?;
     writeln!(out, "  {}", folder.join("report.html").display())?;
     if recording.cancelled {
-        eprintln!("stopped by Ctrl-C after {:.3} s of {:.3} s", summary.duration, scene.duration());
+        eprintln!("{}: stopped after {:.3} s of {duration:.3} s", scene.name(), summary.duration);
     }
     Ok(if summary.stable && !recording.cancelled { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -72,49 +136,38 @@ fn notes(scene: &Scene) -> Vec<String> {
     notes
 }
 
-/// Runs a scene with a progress bar, ended by Ctrl-C.
-pub fn record(scene: &Scene, title: &str) -> Result<Recording> {
+/// Runs a scene in virtual time with a progress bar, ended by Ctrl-C.
+pub fn record(scene: &Scene, title: &str, duration: f64) -> Result<Recording> {
     progress::catch_interrupt();
     let bar = progress::bar(1000, title);
-    let recording = run_virtual(scene, &mut |share| {
+    let recording = run_virtual_for(scene, duration, &mut |share| {
         bar.set_position((share * 1000.0) as u64);
         !progress::interrupted()
     })?;
     bar.finish_and_clear();
     if recording.rows.is_empty() {
-        bail!("the motion is shorter than one time step of {} s", scene.time_step);
+        bail!("the motion or --duration is shorter than one time step of {} s", scene.time_step);
     }
     Ok(recording)
 }
 
-/// Writes `run.csv`, `scene.toml` and `report.html`.
-fn write_folder(
-    scene: &Scene,
-    recording: &Recording,
-    wall: f64,
-    notes: &[String],
-    folder: &Path,
-) -> Result<()> {
+fn write_folder(outcome: &Outcome<'_>, notes: &[String], folder: &Path) -> Result<()> {
+    let Outcome { scene, recording, .. } = outcome;
     let path = folder.join("run.csv");
     let file = std::fs::File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
     recording.write_csv(file).with_context(|| format!("cannot write {}", path.display()))?;
     let path = folder.join("scene.toml");
     std::fs::write(&path, scene.to_toml()?).with_context(|| format!("cannot write {}", path.display()))?;
     let path = folder.join("report.html");
-    let html = report::run(scene, recording, wall, notes)?;
+    let html = report::run(outcome, notes)?;
     std::fs::write(&path, html).with_context(|| format!("cannot write {}", path.display()))?;
     Ok(())
 }
 
-fn print_summary(
-    out: &mut impl Write,
-    scene: &Scene,
-    recording: &Recording,
-    summary: &Summary,
-    wall: f64,
-) -> std::io::Result<()> {
+fn print_summary(out: &mut impl Write, outcome: &Outcome<'_>, summary: &Summary) -> std::io::Result<()> {
+    let Outcome { scene, recording, time } = outcome;
     let state = if summary.stable { "stable" } else { "NOT STABLE" };
-    writeln!(out, "{}: {:.3} s in virtual time, {state}", scene.name(), summary.duration)?;
+    writeln!(out, "{}: {:.3} s in {}, {state}", scene.name(), summary.duration, time.name())?;
     if let Some(time) = recording.fault_time {
         writeln!(out, "  a fault stopped the force at {time:.3} s")?;
     }
@@ -138,5 +191,10 @@ fn print_summary(
         summary.most_contacts,
         summary.most_planes
     )?;
-    writeln!(out, "  computed in {wall:.2} s ({:.2} times real time)", summary.duration / wall)
+    match time {
+        Time::Virtual { wall, .. } => {
+            writeln!(out, "  computed in {wall:.2} s ({:.2} times real time)", summary.duration / wall)
+        }
+        Time::Real(live) => real_time::print_timing(out, live),
+    }
 }

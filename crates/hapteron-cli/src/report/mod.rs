@@ -1,14 +1,20 @@
 //! Reports: one HTML file that needs nothing else, with pictures, tables and plots that can be zoomed.
 
 mod compare;
+mod levels;
 mod picture;
 mod plot;
 mod reproduction;
 mod run;
+mod stability;
+mod timing;
 
 pub use compare::{Compared, comparison};
+pub use levels::levels;
 pub use reproduction::reproduction;
-pub use run::run;
+pub use run::{Live, Outcome, Time, run};
+pub use stability::stability;
+pub use timing::{distribution_json, json as timing_json};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

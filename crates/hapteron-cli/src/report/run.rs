@@ -2,24 +2,76 @@
 
 use super::picture;
 use super::plot::{Plot, Plots};
+use super::timing;
 use super::{Cell, Page};
 use anyhow::Result;
 use hapteron::recording::{GREATEST_DEVIATION, Recording, Row};
 use hapteron::scene::{ContactModel, Scene};
+use hapteron::session::real_time::{End, Grants, Timing};
 use nalgebra::Vector3;
 
 /// Red in the list of colours of the script is the second; the magnitude is drawn dark.
 const DARK: usize = 3;
 
+/// A session in real time, beside its recording.
+pub struct Live {
+    /// Why it ended.
+    pub end: End,
+    /// What the system granted.
+    pub grants: Grants,
+    /// Histograms and counts.
+    pub timing: Timing,
+    /// Lateness and compute time of every tick, nanoseconds.
+    pub ticks: Vec<(u64, u64)>,
+    /// Of the device.
+    pub device: String,
+}
+
+/// By which clock a run went.
+pub enum Time {
+    /// The deterministic schedule, or that of an earlier session; computed in `wall` seconds.
+    Virtual { wall: f64, replayed: bool },
+    /// The machine's.
+    Real(Box<Live>),
+}
+
+impl Time {
+    /// For people.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Virtual { replayed: false, .. } => "virtual time",
+            Self::Virtual { replayed: true, .. } => "virtual time (a session made again)",
+            Self::Real(_) => "real time",
+        }
+    }
+}
+
+/// A run to be reported.
+pub struct Outcome<'a> {
+    pub scene: &'a Scene,
+    pub recording: &'a Recording,
+    pub time: Time,
+}
+
 /// `report.html` of a run. `notes` are said at its top.
-pub fn run(scene: &Scene, recording: &Recording, wall: f64, notes: &[String]) -> Result<String> {
+pub fn run(outcome: &Outcome<'_>, notes: &[String]) -> Result<String> {
+    let Outcome { scene, recording, time } = outcome;
     let summary = recording.summary();
     let verdict = if summary.stable { "stable" } else { "not stable" };
     let mut page = Page::new(scene.name(), Some((verdict, summary.stable)));
-    page.paragraph(&what_was_run(scene, recording), true);
+    page.paragraph(&what_was_run(scene, recording, time), true);
     for note in notes {
         page.paragraph(note, false);
     }
+    let pace = match time {
+        Time::Virtual { wall, .. } => {
+            (format!("{:.1} x", summary.duration / wall.max(1e-9)), "real time, computed")
+        }
+        Time::Real(live) => {
+            let share = live.timing.lateness.share_up_to(50_000) * 100.0;
+            (format!("{share:.2} %"), "of the ticks at most 50 us late")
+        }
+    };
     let depth = summary.greatest_penetration * 1e3;
     let penetration = if depth > 0.0 { format!("{depth:.3} mm") } else { "none".to_owned() };
     page.tiles(&[
@@ -30,29 +82,41 @@ pub fn run(scene: &Scene, recording: &Recording, wall: f64, notes: &[String]) ->
         (format!("{:.0} %", summary.in_contact * 100.0), "of the time in contact"),
         (format!("{} on {}", summary.most_contacts, summary.most_planes), "most contacts on planes"),
         (format!("{:.0} mN", summary.force_roughness * 1e3), "rms force step a tick, in contact"),
-        (format!("{:.1} x", summary.duration / wall.max(1e-9)), "real time, computed"),
+        pace,
     ]);
     page.pictures(&picture::of_run(scene, recording)?);
     page.heading("Over time");
-    page.plots(&plots(recording));
+    page.plots(&plots(recording, time));
+    if let Time::Real(live) = time {
+        timing::section(&mut page, live);
+    }
     page.heading("Setting");
     page.table(&["quantity", "value"], &setting(scene));
     page.details("scene.toml: every value of this run", &scene.to_toml()?);
+    let again = match time {
+        Time::Virtual { replayed: false, .. } => "hapteron run scene.toml --virtual-time",
+        _ => "hapteron run scene.toml --replay device.csv",
+    };
     page.paragraph(
-        "Repeat it bit for bit with: hapteron run scene.toml --virtual-time (in this folder). The numbers behind the plots are in run.csv.",
+        &format!("Repeat it bit for bit with: {again} (in this folder). The numbers behind the plots are in run.csv."),
         true,
     );
     Ok(page.finish())
 }
 
-fn what_was_run(scene: &Scene, recording: &Recording) -> String {
+fn what_was_run(scene: &Scene, recording: &Recording, time: &Time) -> String {
     let triangles = |mesh: &hapteron::collision::mesh::TriMesh| mesh.triangles().len();
     let obstacles: usize = scene.obstacles.iter().map(|o| triangles(&o.model.mesh)).sum();
-    let hand =
-        if scene.hand.is_some() { "a simulated hand that feels the force" } else { "a recorded motion" };
+    let hand = match time {
+        Time::Real(live) => format!("a device ({})", live.device),
+        Time::Virtual { replayed: true, .. } => "the device's recorded motion".to_owned(),
+        Time::Virtual { .. } if scene.hand.is_some() => "a simulated hand that feels the force".to_owned(),
+        Time::Virtual { .. } => "a recorded motion".to_owned(),
+    };
     let mut text = format!(
-        "{:.3} s in virtual time at {:.0} Hz: a body of {:.3} g and {} triangles, held by {hand}, against {obstacles} triangles.",
+        "{:.3} s in {} at {:.0} Hz: a body of {:.3} g and {} triangles, held by {hand}, against {obstacles} triangles.",
         recording.rows.last().map_or(0.0, |r| r.time),
+        time.name(),
         1.0 / scene.time_step,
         scene.body.mass() * 1e3,
         triangles(&scene.model.mesh),
@@ -60,13 +124,17 @@ fn what_was_run(scene: &Scene, recording: &Recording) -> String {
     if let Some(time) = recording.fault_time {
         text.push_str(&format!(" A fault stopped the force at {time:.3} s."));
     }
-    if recording.cancelled {
-        text.push_str(" Ended by Ctrl-C.");
+    match time {
+        Time::Real(live) if !live.end.is_regular() => {
+            text.push_str(&format!(" It ended early: {}.", live.end));
+        }
+        _ if recording.cancelled => text.push_str(" Ended by Ctrl-C."),
+        _ => {}
     }
     text
 }
 
-fn plots(recording: &Recording) -> Plots {
+fn plots(recording: &Recording, time: &Time) -> Plots {
     let rows = &recording.rows;
     let mut plots = Plots::new("time [s]");
     let column = |value: &dyn Fn(&Row) -> f64| rows.iter().map(value).collect::<Vec<f64>>();
@@ -97,6 +165,9 @@ fn plots(recording: &Recording) -> Plots {
             .series("planes", times, &column(&|r| f64::from(r.clusters))),
     );
     plots.add(Plot::new("Age of the contacts", "ms").series("age", times, &column(&|r| r.contact_age * 1e3)));
+    if let Time::Real(live) = time {
+        timing::over_time(&mut plots, times, live);
+    }
     plots
 }
 

@@ -39,7 +39,14 @@ impl Drop for Folder {
 
 /// Runs `hapteron` in a folder.
 pub fn hapteron(folder: &Folder, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hapteron")).args(arguments).current_dir(folder.path()).output().unwrap()
+    hapteron_command(folder, arguments).output().unwrap()
+}
+
+/// The command, to be run.
+pub fn hapteron_command(folder: &Folder, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hapteron"));
+    command.args(arguments).current_dir(folder.path());
+    command
 }
 
 pub fn stdout(output: &Output) -> String {

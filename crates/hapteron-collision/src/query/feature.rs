@@ -8,7 +8,7 @@ const TOUCHING: f64 = 1e-12;
 
 /// A feature of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Feature {
+pub(crate) enum Feature {
     Vertex(u32),
     Edge(u32),
     Face(u32),
@@ -16,7 +16,7 @@ pub(super) enum Feature {
 
 impl Feature {
     /// One number for all features of a surface: vertices first, then edges, then faces.
-    pub(super) fn number(self, surface: &Surface) -> u32 {
+    pub(crate) fn number(self, surface: &Surface) -> u32 {
         match self {
             Self::Vertex(i) => i,
             Self::Edge(i) => surface.vertices.len() as u32 + i,
@@ -27,7 +27,7 @@ impl Feature {
 
 /// The foot of a point on a surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Foot {
+pub(crate) struct Foot {
     pub point: Vec3,
     pub feature: Feature,
     /// Distance with its sign: negative inside.
@@ -83,7 +83,7 @@ pub(super) fn closest_on_triangle(
 
 /// Foot of `p` on one triangle of the surface, with the side taken from the closest feature's normal.
 #[inline(always)]
-pub(super) fn foot(p: Vec3, triangle: u32, surface: &Surface) -> Foot {
+pub(crate) fn foot(p: Vec3, triangle: u32, surface: &Surface) -> Foot {
     let corners = surface.triangles[triangle as usize].map(|v| surface.vertices[v as usize]);
     let (point, feature) = closest_on_triangle(p, corners, triangle, surface);
     let from = sub(p, point);

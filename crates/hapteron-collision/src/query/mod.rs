@@ -7,7 +7,7 @@
 //! closer than the tolerance with one contact at each vertex there, and its least distance is the exact one, at a
 //! fraction of the cost of listing all pairs of close triangles.
 
-mod feature;
+pub(crate) mod feature;
 mod kernel;
 mod result;
 mod ridge_kernel;

@@ -158,6 +158,11 @@ impl Surface {
         build::surface(mesh.vertices(), mesh.triangles())
     }
 
+    /// The same for triangles that are known to be sound.
+    pub(crate) fn of_triangles(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Self {
+        build::surface(vertices, triangles)
+    }
+
     /// Triangles in the structure: those of the mesh less the ones whose corners coincide.
     #[must_use]
     pub fn triangle_count(&self) -> usize {

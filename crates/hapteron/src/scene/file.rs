@@ -4,6 +4,7 @@
 //! again with nothing left out.
 
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A scene file.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -35,6 +36,9 @@ pub struct SceneFile {
     /// `[hand]`
     #[serde(default)]
     pub hand: Hand,
+    /// `[guard]`
+    #[serde(default)]
+    pub guard: Guard,
 }
 
 /// `[scene]`
@@ -45,7 +49,7 @@ pub struct General {
     pub name: Option<String>,
     /// World, m/s^2; default none.
     pub gravity: Option<[f64; 3]>,
-    /// Of everything random; nothing is as yet.
+    /// Of everything random: the simulated hand's tremor, the simulated device's jitter.
     pub seed: Option<u32>,
 }
 
@@ -202,16 +206,47 @@ pub enum Method {
 pub struct ContactThread {
     /// From the start of one pass to the start of the next, seconds; default the time step.
     pub period: Option<f64>,
-    /// From the start of a pass until its contacts can be used, seconds; default the time step.
+    /// From the start of a pass until its contacts can be used, seconds; default the time step. In real time it is what it is.
     pub latency: Option<f64>,
+    /// Real time: number of the CPU that it is to stay on; default any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cpu: Option<usize>,
+    /// Real time: 1 to 79 for SCHED_FIFO, below the haptic thread's 80; default ordinary scheduling.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub priority: Option<i32>,
 }
 
 /// `[device]`
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Device {
+    /// "simulated" (default), or the name of a driver.
+    pub kind: Option<String>,
+    /// Simulated: a name of the catalogue; default premium-1.5-6dof. In virtual time it stands in for a real device.
+    pub model: Option<String>,
+    /// Simulated: a force acts this many samples late; default 1.
+    pub delay: Option<usize>,
+    /// Simulated: the share of each new difference in the velocity estimate; default 0.3, 1 is the difference itself.
+    pub velocity_filter: Option<f64>,
+    /// Simulated: samples come up to this much too early or too late, seconds; default 0.
+    pub jitter: Option<f64>,
+    /// Simulated: apparent mass, kg; default the model's.
+    pub mass: Option<f64>,
+    /// Simulated: viscous friction, N s/m; default the model's.
+    pub damping: Option<f64>,
+    /// Simulated: Coulomb friction, N; default the model's.
+    pub friction: Option<f64>,
+    /// Simulated: of the encoders, metres; default the model's.
+    pub resolution: Option<f64>,
     /// Metres in the world for one metre of the device; default 1. Trajectories are in the world's scale.
     pub position_scale: Option<f64>,
+    /// Number of the button, from 0, each press of which lets go of the body or grasps it again; default 0.
+    pub grasp_button: Option<u32>,
+    /// Number of the button, from 0, while which is down the handle moves without the world; default 1.
+    pub clutch_button: Option<u32>,
+    /// Of a driver: what it needs to find its device; see `docs/devices.md`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub options: BTreeMap<String, toml::Value>,
 }
 
 /// `[hand]`
@@ -220,7 +255,11 @@ pub struct Device {
 pub struct Hand {
     /// A file, or `builtin:NAME`.
     pub trajectory: Option<String>,
-    /// Of the hand with the handle, kg.
+    /// How firmly a simulated hand holds the handle; instead of mass, damping and stiffness. Without any of them the handle follows the
+    /// trajectory exactly.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grip: Option<Grip>,
+    /// Of the hand as far as it moves with the handle, kg.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
     /// N s/m.
@@ -229,4 +268,45 @@ pub struct Hand {
     /// N/m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<f64>,
+    /// Of a simulated hand, 8 to 12 Hz, metres; default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tremor: Option<f64>,
+}
+
+/// `hand.grip`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Grip {
+    /// Nobody holds the handle.
+    Released,
+    /// With the fingertips.
+    Light,
+    /// As a pen.
+    Medium,
+    /// As a hammer.
+    Firm,
+}
+
+/// `[guard]`: the limits of what the hand is pushed with, in the device's scale. Defaults come from the device.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Guard {
+    /// Default true where a device or a simulated hand feels the force.
+    pub enabled: Option<bool>,
+    /// N; default the device's peak.
+    pub max_force: Option<f64>,
+    /// N m; default the device's peak.
+    pub max_torque: Option<f64>,
+    /// N/s; default the greatest force in 5 ms. The torque follows in proportion.
+    pub max_slew: Option<f64>,
+    /// W; default the greatest force at 1 m/s.
+    pub max_power: Option<f64>,
+    /// From no force to the whole, seconds; default 0.25.
+    pub ramp_time: Option<f64>,
+    /// Contacts older than this fade, seconds; default 0.1.
+    pub stale_after: Option<f64>,
+    /// A handle that is faster is a fault, m/s; default 2.
+    pub max_speed: Option<f64>,
+    /// Time-domain passivity control; default off.
+    pub passivity: Option<bool>,
 }

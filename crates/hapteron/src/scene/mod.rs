@@ -4,6 +4,7 @@
 //! meshes are loaded, what is missing is filled in, and [`Scene::to_toml`] gives back a file with every value written out, from which
 //! the same scene comes bit for bit. Set-up only; nothing here runs in the haptic tick.
 
+mod closed_loop;
 mod error;
 pub mod file;
 mod read;
@@ -12,14 +13,20 @@ mod resolve;
 pub use error::SceneError;
 pub use file::{ContactModel, SceneFile};
 
+use crate::session::grasp::Buttons;
 use crate::trajectory::Trajectory;
 use error::Source;
 use hapteron_collision::Surface;
+use hapteron_collision::clod::{Detail, Hierarchy, Lod};
 use hapteron_collision::mesh::TriMesh;
-use hapteron_device::{DeviceSample, HandParameters, Scaling};
+use hapteron_device::drivers::DriverOptions;
+use hapteron_device::guard::{Guard, GuardSettings};
+use hapteron_device::simulated::SimulatedSettings;
+use hapteron_device::{Capabilities, DeviceSample, HandParameters, Scaling};
 use hapteron_dynamics::{Coupling, Handle, Method, RigidBody, State};
 use nalgebra::{Isometry3, Vector3};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A mesh with the structure that queries need.
 #[derive(Clone, Debug)]
@@ -28,6 +35,16 @@ pub struct Model {
     pub mesh: TriMesh,
     /// Of the mesh, for queries.
     pub surface: Surface,
+    /// Its contact levels of detail, where the scene has an error threshold.
+    pub hierarchy: Option<Arc<Hierarchy>>,
+}
+
+impl Model {
+    /// Surface and levels, where there are levels.
+    #[must_use]
+    pub fn lod(&self) -> Option<Lod<'_>> {
+        self.hierarchy.as_deref().map(|hierarchy| Lod { surface: &self.surface, hierarchy })
+    }
 }
 
 /// A fixed object.
@@ -48,6 +65,8 @@ pub struct ContactSettings {
     pub damping: f64,
     /// d, metres.
     pub tolerance: f64,
+    /// How coarse contacts may be.
+    pub detail: Detail,
     /// Most clusters; 0: every contact is a plane of its own.
     pub max_clusters: usize,
     /// Contacts farther than this from a cluster found one of their own, metres.
@@ -87,10 +106,16 @@ pub struct Scene {
     pub time_step: f64,
     /// Between device and world.
     pub scaling: Scaling,
+    /// Those of the device that grasp and clutch.
+    pub buttons: Buttons,
     /// The motion of the handle (or of the hand's goal), in the world's scale.
     pub trajectory: Trajectory,
     /// A simulated hand; without, the handle follows the trajectory exactly.
     pub hand: Option<HandParameters>,
+    /// The device that is simulated where there is a hand.
+    pub simulated: SimulatedSettings,
+    /// Its guard; none: switched off, or nobody feels the force.
+    pub guard: Option<GuardSettings>,
     /// The body at the start.
     pub start: State,
 }
@@ -163,6 +188,55 @@ impl Scene {
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.trajectory.duration()
+    }
+
+    /// A guard for a device, with the scene's limits where it has them; none: switched off.
+    ///
+    /// # Errors
+    /// A limit out of its range.
+    pub fn guard_for(&self, device: &Capabilities) -> Result<Option<Guard>, SceneError> {
+        let fault = |e: hapteron_device::guard::GuardError| SceneError {
+            file: self.name().to_owned(),
+            line: None,
+            key: Some(format!("guard.{}", e.0)),
+            problem: e.to_string(),
+        };
+        if self.file.guard.enabled == Some(false) {
+            return Ok(None);
+        }
+        Guard::new(closed_loop::guard_settings(
+            &self.file.guard,
+            device,
+            self.simulated.delay,
+            self.time_step,
+        ))
+        .map(Some)
+        .map_err(fault)
+    }
+
+    /// Takes the limits of a device that is open into the scene, for its guard and for [`Scene::to_toml`].
+    ///
+    /// # Errors
+    /// As [`Scene::guard_for`].
+    pub fn adopt(&mut self, device: &Capabilities) -> Result<(), SceneError> {
+        self.guard = self.guard_for(device)?.map(|guard| *guard.settings());
+        if let Some(settings) = &self.guard {
+            closed_loop::write_out(&mut self.file.guard, settings);
+        }
+        Ok(())
+    }
+
+    /// The driver and its options; none where the device is simulated.
+    #[must_use]
+    pub fn driver(&self) -> Option<(&str, DriverOptions)> {
+        let kind = self.file.device.kind.as_deref().filter(|kind| *kind != closed_loop::SIMULATED)?;
+        let mut options = DriverOptions::new();
+        for (key, value) in &self.file.device.options {
+            // A text without its quotes.
+            let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+            options.set(key.clone(), text);
+        }
+        Some((kind, options))
     }
 
     /// The pose of the body's mesh frame at a state.

@@ -3,17 +3,6 @@
 use super::error::{SceneError, Source};
 use super::file::SceneFile;
 
-/// Keys of the specification that need what this version does not have yet.
-const LATER: [(&str, &str); 4] = [
-    (
-        "guard",
-        "the output guard comes with real devices; this version runs in virtual time. Remove the table",
-    ),
-    ("kind", "real devices are not available yet; this version runs in virtual time. Remove the key"),
-    ("cpu", "it matters in real time only, which is not available yet. Remove the key"),
-    ("priority", "it matters in real time only, which is not available yet. Remove the key"),
-];
-
 /// Reads a scene and sets the overrides (`table.key=value`) in it.
 pub(super) fn read(source: &Source, overrides: &[String]) -> Result<SceneFile, SceneError> {
     let parsed = toml::from_str::<SceneFile>(&source.text);
@@ -90,9 +79,6 @@ fn explain(message: &str) -> String {
     let Some(unknown) = quoted.next().filter(|_| message.starts_with("unknown")) else {
         return message.to_owned();
     };
-    if let Some((_, why)) = LATER.iter().find(|(key, _)| *key == unknown) {
-        return format!("`{unknown}`: {why}");
-    }
     let known: Vec<&str> = quoted.collect();
     let nearest =
         known.iter().map(|k| (strsim::damerau_levenshtein(k, unknown), *k)).min().filter(|(distance, k)| {
@@ -124,7 +110,6 @@ mod tests {
         assert!(fault(&format!("{BODY}[conact]\n"), &[]).contains("did you mean `contact`?"));
         let text = fault(&format!("{BODY}[integrator]\nmethod = \"runge-kuta-4\"\n"), &[]);
         assert!(text.contains("did you mean `runge-kutta-4`?"), "{text}");
-        assert!(fault(&format!("{BODY}[guard]\nmax_force = 3\n"), &[]).contains("virtual time"));
     }
 
     #[test]

@@ -1,16 +1,21 @@
 //! Fills in what a scene leaves out and checks what it says.
 
+use super::closed_loop;
 use super::error::{SceneError, Source};
 use super::file::{self, Anticipation, Auto, SceneFile};
 use super::{ContactModel, ContactSettings, Model, PlacedObstacle, Scene};
-use crate::trajectory::Trajectory;
+use crate::session::grasp::Buttons;
+use crate::session::real_time::HAPTIC_PRIORITY;
+use crate::trajectory::{PoseRow, Trajectory};
 use crate::{assets, motion};
 use hapteron_collision::Surface;
+use hapteron_collision::clod::{Detail, cache};
 use hapteron_collision::mesh::{self, TriMesh};
-use hapteron_device::{DeviceSample, HandParameters, Scaling};
+use hapteron_device::{DeviceSample, Scaling};
 use hapteron_dynamics::{Coupling, Method, RigidBody, Spring, State};
 use nalgebra::{Isometry3, Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::path::Path;
+use std::sync::Arc;
 
 const BUILTIN: &str = "builtin:";
 /// Density of a body that is given neither mass nor density: water's, kg/m^3.
@@ -20,7 +25,7 @@ const CLUSTER_RADIUS: f64 = 0.15;
 /// A quaternion this close to unit length is used bit for bit.
 const EXACT_UNIT: f64 = 1e-14;
 
-type Resolved<T> = Result<T, SceneError>;
+pub(super) type Resolved<T> = Result<T, SceneError>;
 
 pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Resolved<Scene> {
     let resolver = Resolver { source, folder };
@@ -30,17 +35,23 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
     file.scene.seed.get_or_insert(0);
     let gravity = resolver.vector("scene.gravity", *file.scene.gravity.get_or_insert([0.0; 3]))?;
 
-    let model = resolver.model("body.mesh", &mut file.body.mesh, "body.scale", &mut file.body.scale)?;
+    let mut model = resolver.model("body.mesh", &mut file.body.mesh, "body.scale", &mut file.body.scale)?;
     let (body, center_of_mass) = resolver.mass(&mut file.body, &model.mesh)?;
-    let obstacles = resolver.obstacles(&mut file.obstacle)?;
+    let mut obstacles = resolver.obstacles(&mut file.obstacle)?;
     let scaling = file.device.position_scale.get_or_insert(1.0);
     let scaling = Scaling::new(*scaling).map_err(|e| source.fault("device.position_scale", e.to_string()))?;
-    let (trajectory, hand) = resolver.hand(&mut file.hand, time_step)?;
+    let buttons = resolver.buttons(&mut file.device)?;
+    let trajectory = resolver.trajectory(&mut file, center_of_mass, time_step)?;
+    let closed = resolver.closed_loop(&mut file, time_step)?;
 
-    let handle = trajectory.sample(0.0, time_step);
+    let handle = closed.sensed(trajectory.sample(0.0, time_step));
     let coupling = resolver.coupling(&mut file, &handle, center_of_mass)?;
     let start = resolver.start(&mut file, &handle, &body, center_of_mass)?;
-    let contact = resolver.contact(&mut file, &body, &model.surface, time_step)?;
+    let contact = resolver.contact(&mut file, &body, &model, time_step)?;
+    if !contact.detail.is_exact() {
+        let models = std::iter::once(&mut model).chain(obstacles.iter_mut().map(|o| &mut o.model));
+        models.for_each(add_levels);
+    }
     Ok(Scene {
         file,
         body,
@@ -59,19 +70,30 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
         },
         time_step,
         scaling,
+        buttons,
         trajectory,
-        hand,
+        hand: closed.hand,
+        simulated: closed.simulated,
+        guard: closed.guard,
         start,
     })
 }
 
-struct Resolver<'a> {
-    source: &'a Source,
+/// Levels of detail from the user's cache, or else built and put there.
+fn add_levels(model: &mut Model) {
+    let folder = cache::default_folder();
+    // Cannot be cancelled, so it cannot fail.
+    let found = cache::load_or_build(&model.surface, folder.as_deref(), &mut |_| true);
+    model.hierarchy = found.ok().map(|(hierarchy, _)| Arc::new(hierarchy));
+}
+
+pub(super) struct Resolver<'a> {
+    pub(super) source: &'a Source,
     folder: &'a Path,
 }
 
 impl Resolver<'_> {
-    fn positive(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
+    pub(super) fn positive(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
         let v = *value.get_or_insert(default);
         if v > 0.0 && v.is_finite() {
             return Ok(v);
@@ -79,7 +101,7 @@ impl Resolver<'_> {
         Err(self.source.fault(key, format!("is {v}; it must be positive and finite")))
     }
 
-    fn not_negative(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
+    pub(super) fn not_negative(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
         let v = *value.get_or_insert(default);
         if v >= 0.0 && v.is_finite() {
             return Ok(v);
@@ -132,7 +154,7 @@ impl Resolver<'_> {
             raw.scaled(factor).map_err(|e| self.source.fault(scale_key, e.to_string()))?
         };
         let surface = Surface::build(&mesh);
-        Ok(Model { mesh, surface })
+        Ok(Model { mesh, surface, hierarchy: None })
     }
 
     /// Relative to the scene's folder, and absolute, so that a written scene finds its files from anywhere.
@@ -199,33 +221,60 @@ impl Resolver<'_> {
         Ok((rigid, center))
     }
 
-    fn hand(&self, hand: &mut file::Hand, dt: f64) -> Resolved<(Trajectory, Option<HandParameters>)> {
-        let Some(name) = &mut hand.trajectory else {
-            let text = "is missing: in virtual time the handle needs a motion. Give a CSV file (t,px,py,pz,qw,qx,qy,qz), `builtin:NAME`, or --replay FILE";
+    fn buttons(&self, device: &mut file::Device) -> Resolved<Buttons> {
+        let bit = |key: &str, number: &mut Option<u32>, default: u32| {
+            let n = *number.get_or_insert(default);
+            1u32.checked_shl(n).ok_or_else(|| {
+                self.source.fault(
+                    key,
+                    format!(
+                        "is {n}; buttons are counted from 0 to 31. One that the device lacks is never pressed"
+                    ),
+                )
+            })
+        };
+        let grasp = bit("device.grasp_button", &mut device.grasp_button, 0)?;
+        let clutch = bit("device.clutch_button", &mut device.clutch_button, 1)?;
+        if grasp == clutch {
+            return Err(self
+                .source
+                .fault("device.clutch_button", "is the same as grasp_button; give it another"));
+        }
+        Ok(Buttons { grasp, clutch })
+    }
+
+    fn trajectory(&self, file: &mut SceneFile, center: Vector3<f64>, dt: f64) -> Resolved<Trajectory> {
+        let driven = file.device.kind.as_ref().is_some_and(|kind| kind != closed_loop::SIMULATED);
+        let Some(name) = &mut file.hand.trajectory else {
+            if driven {
+                return self.waiting_handle(file, center);
+            }
+            let text = "is missing: without a real device the handle needs a motion. Give a CSV file (t,px,py,pz,qw,qx,qy,qz), `builtin:NAME`, or --replay FILE";
             return Err(self.source.fault("hand.trajectory", text));
         };
         let fault =
             |e: crate::trajectory::TrajectoryError| self.source.fault("hand.trajectory", e.to_string());
-        let trajectory = if let Some(builtin) = name.strip_prefix(BUILTIN) {
-            motion::builtin(builtin, dt).map_err(fault)?
+        if let Some(builtin) = name.strip_prefix(BUILTIN) {
+            motion::builtin(builtin, dt).map_err(fault)
         } else {
             let path = self.path(name);
             *name = path.clone();
-            Trajectory::load(path).map_err(fault)?
-        };
-        let parameters = match (hand.mass, hand.damping, hand.stiffness) {
-            (None, None, None) => None,
-            (Some(mass), Some(damping), Some(stiffness)) => Some(HandParameters { mass, damping, stiffness }),
-            _ => {
-                let text = "a simulated hand needs mass, damping and stiffness together; leave all three out for a handle that follows the motion exactly";
-                return Err(self.source.fault("hand.mass", text));
-            }
-        };
-        if let Some(parameters) = parameters {
-            hapteron_device::Hand::new(parameters, &trajectory.sample(0.0, dt))
-                .map_err(|e| self.source.fault("hand.mass", e.to_string()))?;
+            Trajectory::load(path).map_err(fault)
         }
-        Ok((trajectory, parameters))
+    }
+
+    /// Where a real device's handle is taken to be until it tells: at the centre of mass of the body, or at the origin.
+    fn waiting_handle(&self, file: &mut SceneFile, center: Vector3<f64>) -> Resolved<Trajectory> {
+        let pose = match (file.body.position, &mut file.body.orientation) {
+            (Some(p), Some(q)) => {
+                let rotation = self.rotation("body.orientation", q)?;
+                Isometry3::from_parts((self.vector("body.position", p)? + rotation * center).into(), rotation)
+            }
+            _ => Isometry3::identity(),
+        };
+        let still = |time| PoseRow { time, pose, velocity: Some([Vector3::zeros(); 2]) };
+        Trajectory::from_rows(vec![still(0.0), still(1.0)], "waiting handle")
+            .map_err(|e| self.source.fault("hand.trajectory", e.to_string()))
     }
 
     /// The grasp is given, or recorded from where handle and body are at the start (section 5.1 of the paper).
@@ -307,17 +356,20 @@ impl Resolver<'_> {
         &self,
         file: &mut SceneFile,
         body: &RigidBody,
-        surface: &Surface,
+        model: &Model,
         time_step: f64,
     ) -> Resolved<ContactSettings> {
         let c = &mut file.contact;
-        for (key, value) in
-            [("contact.error_threshold", &mut c.error_threshold), ("contact.friction", &mut c.friction)]
-        {
-            if self.not_negative(key, value, 0.0)? > 0.0 {
-                let text = "is not available yet; contacts are exact and without friction. Set it to 0";
-                return Err(self.source.fault(key, text));
-            }
+        let (_, radius) = model.mesh.bounding_sphere();
+        if self.not_negative("contact.friction", &mut c.friction, 0.0)? > 0.0 {
+            let text = "is not available yet; contacts are without friction. Set it to 0";
+            return Err(self.source.fault("contact.friction", text));
+        }
+        let threshold = self.not_negative("contact.error_threshold", &mut c.error_threshold, 0.0)?;
+        if threshold >= 1.0 {
+            let text =
+                format!("is {threshold}; it is a share of the body's radius, such as 0.025, and 0 is exact");
+            return Err(self.source.fault("contact.error_threshold", text));
         }
         let stiffness = self.positive("contact.stiffness", &mut c.stiffness, 5000.0)?;
         // Half of critical, 0.5 * 2 sqrt(k m): more only raises the impact force (experiments on Fig. 4).
@@ -331,12 +383,20 @@ impl Resolver<'_> {
             }
         };
         let thread = &mut file.contact_thread;
+        if let Some(priority) = thread.priority.filter(|p| !(1..HAPTIC_PRIORITY).contains(p)) {
+            let text = format!(
+                "is {priority}; it must be 1 to {}, below the haptic thread's. Leave it out for ordinary scheduling",
+                HAPTIC_PRIORITY - 1
+            );
+            return Err(self.source.fault("contact_thread.priority", text));
+        }
         Ok(ContactSettings {
             stiffness,
             damping,
             tolerance,
+            detail: Detail::threshold(threshold * radius),
             max_clusters: *c.max_clusters.get_or_insert(0),
-            cluster_radius: CLUSTER_RADIUS * surface.radius(),
+            cluster_radius: CLUSTER_RADIUS * model.surface.radius(),
             model: *c.model.get_or_insert(ContactModel::Planes),
             anticipation,
             period: self.positive("contact_thread.period", &mut thread.period, time_step)?,

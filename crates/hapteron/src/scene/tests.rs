@@ -80,6 +80,15 @@ fn faults_name_the_line_the_key_and_the_cure() {
     assert!(fault("integrator/time_step = inf").contains("positive"));
     assert!(fault("hand/mass = 1").contains("together"));
     assert!(fault("device/position_scale = 0").contains("position_scale"));
+    assert!(fault("hand/grip = \"light\"\nmass = 1").contains("`hand.grip`: stands beside"));
+    assert!(fault("hand/grip = \"loose\"").contains("known here: released, light, medium, firm"));
+    assert!(fault("hand/mass = -1\ndamping = 1\nstiffness = 1").contains("`hand.mass`"));
+    assert!(fault("hand/tremor = 1e-4").contains("give it a grip"));
+    assert!(fault("device/model = \"premium\"").contains("there are premium-1.5-6dof, "));
+    assert!(fault("device/delay = 3").contains("`device.delay`: device.delay is 3; it must be 0, 1 or 2"));
+    assert!(fault("device/velocity_filter = 0").contains("`device.velocity_filter`"));
+    assert!(fault("guard/max_slew = 0").contains("`guard.max_slew`: guard.max_slew is 0"));
+    assert!(fault("guard/max_forc = 1").contains("did you mean `max_force`?"));
     let text = SCENE.replace("builtin:spoon", "builtin:spon");
     assert!(parse(&text).unwrap_err().to_string().contains("there are"), "{text}");
     let text = SCENE.replace("builtin:spoon", "nowhere.stl");
@@ -103,4 +112,41 @@ fn a_body_without_volume_needs_its_mass_properties() {
         "[body]\nmass = 0.01\ninertia = [[1e-5,0,0],[0,1e-5,0],[0,0,2e-5]]\ncenter_of_mass = [0,0,0]\n";
     assert!(try_it(&text.replace("[body]\n", given)).is_ok());
     std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// Would catch a guard that acts on a replay, or is missing where a hand feels the force; and limits that are not the device's.
+#[test]
+fn a_hand_gets_a_guard_with_its_device_s_limits() {
+    let replay = parse(SCENE).unwrap();
+    assert!(replay.guard.is_none() && replay.hand.is_none());
+    let held = parse(&with("hand/grip = \"medium\"")).unwrap();
+    let guard = held.guard.unwrap();
+    assert_eq!((guard.max_force, guard.max_torque), (8.5, 0.5));
+    assert_eq!(held.hand, Some(hapteron_device::Grip::Medium.parameters()));
+    assert_eq!(parse(&held.to_toml().unwrap()).unwrap().guard, held.guard);
+    let text = with("hand/grip = \"medium\"") + "[device]\nmodel = \"touch\"\n[guard]\nmax_slew = 33.0\n";
+    let touch = parse(&text).unwrap().guard.unwrap();
+    assert_eq!((touch.max_force, touch.max_torque, touch.max_slew), (3.3, 0.0, 33.0));
+    assert!(parse(&(text + "enabled = false\n")).unwrap().guard.is_none());
+    assert!(parse(&with("guard/enabled = true")).unwrap().guard.is_some());
+    let device = hapteron_device::simulated::model("sigma.7").unwrap().capabilities();
+    let real = parse(&with("device/kind = \"forcedimension\"")).unwrap();
+    assert_eq!(real.guard_for(&device).unwrap().unwrap().settings().max_force, 12.0);
+}
+
+/// Would catch buttons or a priority that cannot be, and a priority above the haptic thread's.
+#[test]
+fn buttons_and_priorities_are_checked() {
+    assert!(fault("device/grasp_button = 32").contains("0 to 31"));
+    assert!(fault("device/clutch_button = 0").contains("the same as grasp_button"));
+    assert!(fault("contact_thread/priority = 80").contains("1 to 79"));
+    let scene = parse(&with("device/grasp_button = 3")).unwrap();
+    assert_eq!((scene.buttons.grasp, scene.buttons.clutch), (8, 2));
+    let driven = SCENE.replace("trajectory = \"builtin:free-space\"", "") + "[device]\nkind = \"haply\"\n";
+    let options = driven.clone() + "[device.options]\naddress = \"a:1\"\npatience = 0.5\n";
+    let scene = parse(&options).unwrap();
+    let (kind, options) = scene.driver().unwrap();
+    assert_eq!((kind, options.get("address"), options.get("patience")), ("haply", Some("a:1"), Some("0.5")));
+    assert_eq!(parse(&scene.to_toml().unwrap()).unwrap().file, scene.file);
+    assert!(parse(&driven.replace("haply", "simulated")).unwrap_err().to_string().contains("needs a motion"));
 }

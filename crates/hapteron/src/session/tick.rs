@@ -1,7 +1,10 @@
 //! The haptic tick.
 
+use super::command::ContactLaw;
+use super::grasp::{Buttons, Grip};
 use super::{ContactSnapshot, Flags};
-use crate::scene::{ContactModel, Scene, handle_at};
+use crate::scene::{ContactModel, Scene};
+use hapteron_device::guard::{Guard, GuardInput};
 use hapteron_device::{DeviceCommand, DeviceSample, Scaling};
 use hapteron_dynamics::{ContactForce, Coupling, Handle, Method, Problem, RigidBody, State, Step, step};
 use nalgebra::Vector3;
@@ -23,7 +26,16 @@ pub struct Settings {
     pub scaling: Scaling,
     /// How contacts are used between two passes.
     pub contact_model: ContactModel,
+    /// For the passes; what it makes of contacts is in the snapshot.
+    pub contact_law: ContactLaw,
+    /// Those of the device that grasp and clutch.
+    pub buttons: Buttons,
+    /// How long the force takes from what it was to what it is after a switch, seconds.
+    pub blend_time: f64,
 }
+
+/// [`Settings::blend_time`] unless it is set otherwise, seconds: longer than a hand's reflex would notice as a blow, shorter than it waits.
+pub const BLEND_TIME: f64 = 0.05;
 
 impl Settings {
     /// Those of a scene.
@@ -37,6 +49,9 @@ impl Settings {
             time_step: scene.time_step,
             scaling: scene.scaling,
             contact_model: scene.contact.model,
+            contact_law: ContactLaw { stiffness: scene.contact.stiffness, damping: scene.contact.damping },
+            buttons: scene.buttons,
+            blend_time: BLEND_TIME,
         }
     }
 }
@@ -48,13 +63,29 @@ pub struct HapticState {
     pub state: State,
     /// The fault that stopped the session, if one did.
     pub fault: Option<Flags>,
+    /// What the hand holds, and where its workspace lies in the world.
+    pub grip: Grip,
+    /// What the command goes through at the end; none where no one feels it.
+    pub guard: Option<Guard>,
 }
 
 impl HapticState {
-    /// A body without a fault.
+    /// A body without a fault, and a command that nothing guards: for replays.
     #[must_use]
     pub fn new(state: State) -> Self {
-        Self { state, fault: None }
+        Self { state, fault: None, grip: Grip::new(), guard: None }
+    }
+
+    /// A body without a fault, and a guard before the device.
+    #[must_use]
+    pub fn guarded(state: State, guard: Guard) -> Self {
+        Self { guard: Some(guard), ..Self::new(state) }
+    }
+
+    /// Takes the body's momentum away.
+    pub fn stand_still(&mut self) {
+        self.state.linear_momentum = Vector3::zeros();
+        self.state.angular_momentum = Vector3::zeros();
     }
 }
 
@@ -78,7 +109,8 @@ pub struct Tick {
 /// One haptic tick: the step from the last tick to the device sample's time `now` (seconds), and the command for the device.
 ///
 /// Pure: the same arguments give the same bits, and nothing else is read or written. A fault (a number that is not finite, a singular
-/// system) latches: from then on the body stays and the command is zero. Section 3.1 of the paper.
+/// system) latches: from then on the body stays and the command is zero. Section 3.1 of the paper. The command goes through the guard, if
+/// there is one, as the last thing; the sample's time and `now` must be of one clock then.
 ///
 /// Real time: no allocation, lock, clock, input or output and no panic; time in proportion to the snapshot's planes, of which there
 /// are at most [`super::MAX_PLANES`].
@@ -90,37 +122,78 @@ pub fn tick(
     contacts: &ContactSnapshot,
     now: f64,
 ) -> Tick {
-    let handle = handle_at(&settings.scaling.to_world(sample));
-    let contact = match settings.contact_model {
-        ContactModel::Planes => ContactForce::Planes(contacts.planes()),
-        ContactModel::Linearized => ContactForce::Linearized(contacts.linearized()),
-        ContactModel::Held => ContactForce::Held(contacts.linearized()),
+    let mut grip = before.grip;
+    let scaled = settings.scaling.to_world(sample);
+    let handle = grip.follow(&scaled, settings.buttons, &settings.coupling, &before.state, &settings.body);
+    let coupling = grip.coupling(&settings.coupling);
+    let mut next = if stands_still(settings, &grip) {
+        stopped(&before.state)
+    } else {
+        let contact = contact_force(settings, contacts);
+        let problem = Problem {
+            body: &settings.body,
+            coupling: &coupling,
+            handle: &handle,
+            contact,
+            gravity: settings.gravity,
+        };
+        step(&problem, &before.state, settings.time_step, settings.method)
     };
-    let problem = Problem {
-        body: &settings.body,
-        coupling: &settings.coupling,
-        handle: &handle,
-        contact,
-        gravity: settings.gravity,
-    };
-    let mut next = step(&problem, &before.state, settings.time_step, settings.method);
-    let mut flags = Flags::from_status(next.status).with(contacts.flags());
+    if !grip.is_held() {
+        // An open hand has no deviation from anything.
+        (next.deviation, next.angle) = (0.0, 0.0);
+    }
+    let mut flags = Flags::from_status(next.status).with(contacts.flags()).with(grip.flags());
     let fault = before.fault.or_else(|| next.status.is_fault().then_some(flags));
-    let mut command = settings
-        .scaling
-        .to_device(&DeviceCommand { force: next.feedback.force, torque: next.feedback.torque });
+    let feedback = DeviceCommand { force: next.feedback.force, torque: next.feedback.torque };
+    let felt = if grip.feels() { settings.scaling.to_device(&feedback) } else { DeviceCommand::zero() };
+    let mut command = grip.blended(felt, settings.time_step / settings.blend_time);
     if fault.is_some() {
         flags = flags.with(Flags::FAULT_LATCHED);
         command = DeviceCommand::zero();
+        grip.silence();
         next = Step { state: before.state, status: next.status, ..stopped(&before.state) };
     }
+    let contact_age = now - contacts.time();
+    let mut guard = before.guard;
+    if let Some(guard) = &mut guard {
+        let sample_age = now - sample.time;
+        let simulation_fault = fault.is_some();
+        let guarded = guard.pass(&GuardInput {
+            command,
+            sample: *sample,
+            time: now,
+            contact_age,
+            sample_age,
+            simulation_fault,
+        });
+        command = guarded.command;
+        flags = flags.with(Flags::from_guard(guarded.status));
+    }
     Tick {
-        after: HapticState { state: next.state, fault },
+        after: HapticState { state: next.state, fault, grip, guard },
         handle,
         step: next,
         command,
-        contact_age: now - contacts.time(),
+        contact_age,
         flags,
+    }
+}
+
+/// Whether there is nothing to integrate: while paused, and without a coupling by the quasi-static method, which balances one.
+fn stands_still(settings: &Settings, grip: &Grip) -> bool {
+    grip.is_paused() || (!grip.is_held() && settings.method == Method::QuasiStatic)
+}
+
+fn contact_force<'a>(settings: &Settings, contacts: &'a ContactSnapshot) -> ContactForce<'a> {
+    match settings.contact_model {
+        // Just switched: the snapshot was made for planes.
+        ContactModel::Linearized | ContactModel::Held if !contacts.is_linearized() => {
+            ContactForce::Planes(contacts.planes())
+        }
+        ContactModel::Planes => ContactForce::Planes(contacts.planes()),
+        ContactModel::Linearized => ContactForce::Linearized(contacts.linearized()),
+        ContactModel::Held => ContactForce::Held(contacts.linearized()),
     }
 }
 

@@ -5,12 +5,16 @@
 //! one starts at s + period, or when this one is ready, whichever is later. At equal times the tick comes first. Period and
 //! latency may be any fraction of dt. The first pass looks at the starting state and is ready at once: no one grips an object
 //! before its contacts are known.
+//!
+//! With a simulated hand the loop is closed: tick i's command pushes the simulated device from t_i + delay dt on, by default one sample late.
 
-use super::{ContactPass, ContactSnapshot, Flags, HapticState, Settings, Tick, tick};
+use super::contact_pass::sample_speed;
+use super::{ContactPass, ContactSnapshot, HapticState, Settings, Tick, tick};
 use crate::recording::{Recording, Row};
-use crate::scene::Scene;
-use hapteron_device::{DeviceCommand, DeviceSample, Hand};
-use nalgebra::Vector3;
+use crate::scene::{Scene, SceneError};
+use hapteron_device::guard::Guard;
+use hapteron_device::simulated::SimulatedDevice;
+use hapteron_device::{Device, DeviceSample};
 
 /// Times closer than this are equal, seconds.
 const SAME_TIME: f64 = 1e-9;
@@ -23,8 +27,8 @@ pub struct VirtualTime<'a> {
     scene: &'a Scene,
     settings: Settings,
     haptic: HapticState,
-    hand: Option<Hand>,
-    command: DeviceCommand,
+    /// Where a simulated hand feels the force.
+    device: Option<SimulatedDevice>,
     sample: DeviceSample,
     pass: ContactPass,
     /// What ticks use.
@@ -43,19 +47,19 @@ impl<'a> VirtualTime<'a> {
     /// A session at the start of a scene.
     ///
     /// # Errors
-    /// Parameters of the hand that no hand has (a scene that was read has been checked already).
-    pub fn new(scene: &'a Scene) -> Result<Self, hapteron_device::HandError> {
+    /// A device or guard that cannot be (a scene that was read has been checked already).
+    pub fn new(scene: &'a Scene) -> Result<Self, SceneError> {
         let sample = in_device_scale(scene, &scene.trajectory.sample(0.0, scene.time_step));
-        let hand = scene.hand.map(|p| Hand::new(p, &sample)).transpose()?;
+        let device = simulated_device(scene, &sample)?;
+        let guard = scene.guard.map(Guard::new).transpose().map_err(|e| fault(scene, e.to_string()))?;
         let mut pass = ContactPass::new(scene);
         let mut current = ContactSnapshot::empty(&scene.body, &scene.start);
-        pass.run(scene, &scene.start, speed_of_handle(scene, &sample), 0.0, &mut current);
+        pass.run(scene, &scene.start, sample_speed(scene, &sample), 0.0, &mut current);
         Ok(Self {
             scene,
             settings: Settings::of(scene),
-            haptic: HapticState::new(scene.start),
-            hand,
-            command: DeviceCommand::zero(),
+            haptic: HapticState { guard, ..HapticState::new(scene.start) },
+            device,
             sample,
             pass,
             pending: current.clone(),
@@ -74,16 +78,33 @@ impl<'a> VirtualTime<'a> {
         let now = self.ticks as f64 * dt;
         self.run_passes(now, now - SAME_TIME);
         let goal = in_device_scale(self.scene, &self.scene.trajectory.sample(now, dt));
-        self.sample = match &mut self.hand {
-            Some(hand) => hand.advance(&goal, &self.command, dt),
+        self.sample = match &mut self.device {
+            Some(device) => {
+                device.set_goal(&goal);
+                device.advance(dt);
+                // Read and write fail only on what the tick never gives.
+                DeviceSample { time: now, ..device.read().unwrap_or(self.sample) }
+            }
             None => goal,
         };
         let result = tick(&self.settings, &self.haptic, &self.sample, &self.current, now);
         self.haptic = result.after;
-        self.command = result.command;
+        if let Some(device) = &mut self.device {
+            let _ = device.write(&result.command);
+        }
         self.fresh = false;
         self.run_passes(now - 2.0 * SAME_TIME, now + SAME_TIME);
         result
+    }
+
+    /// The simulated device, where there is one: to change the hand, or look at the handle.
+    pub fn device(&mut self) -> Option<&mut SimulatedDevice> {
+        self.device.as_mut()
+    }
+
+    /// The guard, where there is one: to see its fault, or re-arm it.
+    pub fn guard(&mut self) -> Option<&mut Guard> {
+        self.haptic.guard.as_mut()
     }
 
     /// The snapshot that the next tick would use now.
@@ -94,7 +115,7 @@ impl<'a> VirtualTime<'a> {
 
     /// Signed distance of the surfaces at the newest state, metres; infinite when nothing is closer than the tolerance.
     pub fn min_distance(&mut self) -> f64 {
-        if self.fresh {
+        if self.fresh && self.scene.contact.detail.is_exact() {
             // The pass under way looks at this very state.
             return self.pending.min_distance();
         }
@@ -115,7 +136,7 @@ impl<'a> VirtualTime<'a> {
                 return;
             }
             let stamp = self.newest_time(start_before);
-            let speed = speed_of_handle(self.scene, &self.sample);
+            let speed = sample_speed(self.scene, &self.sample);
             self.pass.run(self.scene, &self.haptic.state, speed, stamp, &mut self.pending);
             self.fresh = true;
             let ready = self.next_start + self.scene.contact.latency;
@@ -131,16 +152,26 @@ impl<'a> VirtualTime<'a> {
     }
 }
 
+fn fault(scene: &Scene, problem: String) -> SceneError {
+    SceneError { file: scene.name().to_owned(), line: None, key: None, problem }
+}
+
+/// The scene's device in the scene's hand, switched on.
+pub(super) fn simulated_device(
+    scene: &Scene,
+    start: &DeviceSample,
+) -> Result<Option<SimulatedDevice>, SceneError> {
+    if scene.hand.is_none() {
+        return Ok(None);
+    }
+    let mut device = SimulatedDevice::new(scene.simulated, start).map_err(|e| fault(scene, e.to_string()))?;
+    device.set_force_enabled(true).map_err(|e| fault(scene, e.to_string()))?;
+    Ok(Some(device))
+}
+
 /// Trajectories are in the world's scale; the device is in its own.
 fn in_device_scale(scene: &Scene, sample: &DeviceSample) -> DeviceSample {
     scene.scaling.from_world(sample)
-}
-
-/// Speed of the fastest point that would move with the handle, in the world, m/s.
-fn speed_of_handle(scene: &Scene, sample: &DeviceSample) -> f64 {
-    let sample = scene.scaling.to_world(sample);
-    let norm = |v: Vector3<f64>| libm::sqrt(v.norm_squared());
-    norm(sample.linear_velocity) + norm(sample.angular_velocity) * scene.model.surface.radius()
 }
 
 /// Runs a scene from its start to the end of its motion.
@@ -150,9 +181,21 @@ fn speed_of_handle(scene: &Scene, sample: &DeviceSample) -> f64 {
 ///
 /// # Errors
 /// As [`VirtualTime::new`].
-pub fn run_virtual(scene: &Scene, progress: Progress<'_>) -> Result<Recording, hapteron_device::HandError> {
+pub fn run_virtual(scene: &Scene, progress: Progress<'_>) -> Result<Recording, SceneError> {
+    run_virtual_for(scene, scene.duration(), progress)
+}
+
+/// As [`run_virtual`], for so many seconds; after its end the motion stands still.
+///
+/// # Errors
+/// As [`VirtualTime::new`].
+pub fn run_virtual_for(
+    scene: &Scene,
+    duration: f64,
+    progress: Progress<'_>,
+) -> Result<Recording, SceneError> {
     let mut session = VirtualTime::new(scene)?;
-    let ticks = (scene.duration() / scene.time_step + SAME_TIME / scene.time_step).floor() as u64;
+    let ticks = (duration / scene.time_step + SAME_TIME / scene.time_step).floor() as u64;
     let mut recording = Recording::new();
     recording.rows.reserve(ticks.min(10_000_000) as usize);
     let report_every = (ticks / 100).max(1);
@@ -168,7 +211,7 @@ pub fn run_virtual(scene: &Scene, progress: Progress<'_>) -> Result<Recording, h
             recording.cancelled = true;
             break;
         }
-        if result.flags.contains(Flags::FAULT_LATCHED) && recording.fault_time.is_none() {
+        if result.flags.no_force() && recording.fault_time.is_none() {
             recording.fault_time = Some(i as f64 * scene.time_step);
         }
     }

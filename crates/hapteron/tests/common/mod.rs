@@ -1,4 +1,5 @@
 //! What several tests need.
+#![allow(dead_code, reason = "not every test file uses every helper")]
 
 use hapteron::recording::Recording;
 use hapteron::scene::{Scene, SceneFile};

@@ -4,7 +4,7 @@ use crate::progress;
 use anyhow::{Result, bail};
 use hapteron::recording::{GREATEST_ANGLE, GREATEST_DEVIATION, Recording};
 use hapteron::scene::{Scene, SceneFile};
-use hapteron::session::{Flags, VirtualTime, run_virtual};
+use hapteron::session::{VirtualTime, run_virtual};
 
 /// A number of the paper with ours.
 #[derive(Clone, Debug)]
@@ -98,7 +98,7 @@ pub fn is_stable(file: SceneFile) -> Result<bool> {
     let ticks = (scene.duration() / scene.time_step).round() as u64;
     for _ in 0..ticks {
         let tick = session.advance();
-        let lost = tick.flags.contains(Flags::FAULT_LATCHED)
+        let lost = tick.flags.no_force()
             || tick.step.deviation >= GREATEST_DEVIATION
             || tick.step.angle >= GREATEST_ANGLE;
         if lost {

@@ -4,6 +4,7 @@ mod fig2;
 mod fig4;
 mod fig6;
 pub mod figure;
+mod thresholds;
 
 use crate::arguments::{Figure as Name, Reproduce};
 use crate::commands::run::free_folder;

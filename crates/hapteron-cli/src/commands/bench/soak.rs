@@ -1,0 +1,173 @@
+//! A long session: whether it leaks memory, and whether anything drifts.
+
+use crate::progress;
+use anyhow::{Result, bail};
+use hapteron::scene::Scene;
+use hapteron::scenes;
+use hapteron::session::Flags;
+use hapteron::session::real_time::{
+    RealTime, RealTimeOptions, SceneDevice, TickRecord, Told, clock, system::resident_bytes,
+};
+use serde_json::json;
+use std::io::Write;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// More growth of memory than this after the first cycle is a leak, bytes.
+const LEAK: f64 = 2.0e6;
+/// More change than this of what each cycle of the motion repeats is a drift, as a share.
+const DRIFT: f64 = 0.1;
+/// The clock of the ticks may be this far from the machine's at the end, seconds: a tick under way, and the start of the threads.
+const CLOCK_DRIFT: f64 = 0.02;
+
+/// One cycle of the motion.
+#[derive(Clone, Copy, Default)]
+struct Cycle {
+    ticks: u64,
+    force_sum: f64,
+    greatest_force: f64,
+    compute_ns: u64,
+    late_ns: u64,
+    memory: f64,
+}
+
+impl Cycle {
+    fn add(&mut self, record: &TickRecord) {
+        let force = record.result.command.force.norm();
+        self.ticks += 1;
+        self.force_sum += force;
+        self.greatest_force = self.greatest_force.max(force);
+        self.compute_ns += record.compute_ns;
+        self.late_ns += record.lateness_ns;
+    }
+
+    fn mean_force(&self) -> f64 {
+        self.force_sum / self.ticks.max(1) as f64
+    }
+}
+
+/// Runs the demonstration again and again for some seconds; fails when memory grows or anything drifts.
+pub fn soak(seconds: f64, json: bool) -> Result<ExitCode> {
+    progress::catch_interrupt();
+    let scene = Arc::new(Scene::from_file(scenes::demo())?);
+    let cycle_time = scene.duration();
+    if seconds < 3.0 * cycle_time {
+        bail!(
+            "--soak {seconds}: the motion takes {cycle_time} s and is compared from cycle to cycle; give at least {}",
+            3.0 * cycle_time
+        );
+    }
+    let device = SceneDevice::new(Arc::clone(&scene), true)?;
+    let options = RealTimeOptions { duration: Some(seconds), attach: false, ..RealTimeOptions::of(&scene) };
+    let mut running = RealTime::start(Arc::clone(&scene), Box::new(device), options)?;
+    let started = clock::now_ns();
+    let mut cycles: Vec<Cycle> = Vec::with_capacity((seconds / cycle_time) as usize + 2);
+    let mut last_time = 0.0;
+    let mut fault: Option<(f64, Flags)> = None;
+    let mut seen_at = started;
+    let bar = progress::bar(seconds as u64, "soak");
+    // After a fault there is no force, and nothing to be compared.
+    while !running.is_over() && !progress::interrupted() && fault.is_none() {
+        std::thread::sleep(Duration::from_millis(50));
+        running.drain(&mut |told| {
+            if let Told::Tick(record) = told {
+                let index = (record.time / cycle_time) as usize;
+                while cycles.len() <= index {
+                    cycles.push(Cycle::default());
+                    if let (Some(cycle), Some(memory)) = (cycles.last_mut(), resident_bytes()) {
+                        cycle.memory = memory as f64;
+                    }
+                }
+                cycles[index].add(record);
+                if record.result.flags.no_force() && fault.is_none() {
+                    fault = Some((record.time, record.result.flags));
+                }
+                last_time = record.time;
+            }
+        });
+        seen_at = clock::now_ns();
+        bar.set_position(last_time as u64);
+    }
+    bar.finish_and_clear();
+    let memory_end = resident_bytes().unwrap_or(0) as f64;
+    let finished = running.stop();
+    if !finished.end.is_regular() {
+        bail!("the session ended early: {}", finished.end);
+    }
+    if let Some((time, flags)) = fault {
+        let timing = finished.timing;
+        bail!(
+            "a fault took the force away at {time:.3} s: {}; {} deadlines missed until then, contacts up to {:.0} ms old",
+            flags.names().collect::<Vec<_>>().join(", "),
+            timing.missed,
+            timing.contact_age.greatest_ns as f64 * 1e-6
+        );
+    }
+    // Whole cycles only; the first one warms up.
+    cycles.truncate((last_time / cycle_time + 0.01) as usize);
+    if cycles.len() < 3 {
+        bail!("stopped before the third cycle; nothing to compare");
+    }
+    let (early, late) = (cycles[1], cycles[cycles.len() - 1]);
+    let growth = memory_end - early.memory;
+    let force_drift = late.mean_force() / early.mean_force() - 1.0;
+    let clock_drift = (seen_at - started) as f64 * 1e-9 - last_time;
+    let good = growth < LEAK && force_drift.abs() < DRIFT && clock_drift.abs() < CLOCK_DRIFT.max(0.1);
+    let mean_us = |total: u64, c: &Cycle| total as f64 * 1e-3 / c.ticks.max(1) as f64;
+    if json {
+        let value = json!({
+            "seconds": last_time,
+            "cycles": cycles.len(),
+            "memory_after_one_cycle": early.memory,
+            "memory_at_the_end": memory_end,
+            "growth_bytes": growth,
+            "mean_force_second_cycle": early.mean_force(),
+            "mean_force_last_cycle": late.mean_force(),
+            "force_drift": force_drift,
+            "clock_drift_s": clock_drift,
+            "missed": finished.timing.missed,
+            "good": good,
+        });
+        writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&value)?)?;
+    } else {
+        let mut out = std::io::stdout().lock();
+        writeln!(
+            out,
+            "{last_time:.1} s, {} cycles, {} deadlines missed",
+            cycles.len(),
+            finished.timing.missed
+        )?;
+        writeln!(
+            out,
+            "  memory {:.2} MiB after the first cycle, {:.2} MiB at the end: {:+.0} KiB",
+            early.memory / 1048576.0,
+            memory_end / 1048576.0,
+            growth / 1024.0
+        )?;
+        writeln!(
+            out,
+            "  mean force {:.4} N in the second cycle, {:.4} N in the last: {:+.2} %; greatest {:.3} and {:.3} N",
+            early.mean_force(),
+            late.mean_force(),
+            force_drift * 100.0,
+            early.greatest_force,
+            late.greatest_force
+        )?;
+        writeln!(
+            out,
+            "  a tick computes for {:.1} us and then {:.1} us; is late by {:.2} us and then {:.2} us (means)",
+            mean_us(early.compute_ns, &early),
+            mean_us(late.compute_ns, &late),
+            mean_us(early.late_ns, &early),
+            mean_us(late.late_ns, &late)
+        )?;
+        writeln!(
+            out,
+            "  the ticks' clock is {:+.1} ms from the machine's; {}",
+            -clock_drift * 1e3,
+            if good { "no leak, no drift" } else { "NOT GOOD" }
+        )?;
+    }
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}

@@ -1,0 +1,213 @@
+//! Runs in real time: the session, its live line, and the run folder.
+
+use super::run::{begin, finish};
+use crate::progress;
+use crate::report::{self, Live, Outcome, Time};
+use anyhow::{Context, Result, bail};
+use hapteron::device::{Device, drivers};
+use hapteron::scene::Scene;
+use hapteron::session::real_time::{
+    Finished, PassRecord, RealTime, RealTimeOptions, Recorded, Recorder, Running, SceneDevice, TickRecord,
+    Told,
+};
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// How a run is made.
+pub struct Plan {
+    /// Seconds; none: as long as the scene's motion, or until Ctrl-C with a real device.
+    pub duration: Option<f64>,
+    /// Measure a bare loop besides.
+    pub bare: bool,
+    /// The motion begins anew at its end.
+    pub repeat: bool,
+    /// The handle follows the scene's motion, whatever device the scene names.
+    pub recorded_motion: bool,
+}
+
+/// Between two looks at the session.
+const LOOK: Duration = Duration::from_millis(20);
+/// Between two live lines.
+const LINE: Duration = Duration::from_millis(500);
+
+/// Runs a scene in real time and writes the run folder; fails when the run was not stable or ended early.
+pub fn run_into(mut scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode> {
+    let notes = begin(&scene, folder)?;
+    progress::catch_interrupt();
+    let driver = scene.driver().filter(|_| !plan.recorded_motion);
+    let real = match driver {
+        Some((kind, options)) => Some(drivers::open(kind, &options)?),
+        None => None,
+    };
+    if let Some(device) = &real {
+        scene.adopt(device.capabilities())?;
+    }
+    let scene = Arc::new(scene);
+    // A real device is held as long as its user likes; a motion has an end.
+    let duration = plan.duration.or_else(|| real.is_none().then(|| scene.duration()));
+    let attach = real.is_some();
+    let device: Box<dyn Device> = match real {
+        Some(device) => device,
+        None => Box::new(SceneDevice::new(Arc::clone(&scene), plan.repeat)?),
+    };
+    let name = device.capabilities().name.clone();
+    let options = RealTimeOptions { duration, bare: plan.bare, attach, ..RealTimeOptions::of(&scene) };
+    let running = RealTime::start(Arc::clone(&scene), device, options)?;
+    eprintln!("haptic thread: {}; memory {}", running.grants().priority, running.grants().memory);
+    let (finished, recorded) = follow(running, Arc::clone(&scene))?;
+    let Recorded { mut recording, log, timing } = recorded;
+    if recording.rows.is_empty() {
+        bail!("the session ended before its first tick: {}", finished.end);
+    }
+    // Without a duration Ctrl-C is the way to end it.
+    recording.cancelled = progress::interrupted() && duration.is_some();
+    let path = folder.join("device.csv");
+    let file = std::fs::File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
+    log.write_csv(file).with_context(|| format!("cannot write {}", path.display()))?;
+    let live = Live {
+        end: finished.end.clone(),
+        grants: finished.grants,
+        timing: finished.timing,
+        ticks: timing,
+        device: name,
+    };
+    let path = folder.join("timing.json");
+    let text = serde_json::to_string_pretty(&report::timing_json(&live))?;
+    std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    let outcome = Outcome { scene: &scene, recording: &recording, time: Time::Real(Box::new(live)) };
+    let code = finish(&outcome, duration.unwrap_or_default(), &notes, folder)?;
+    if !finished.end.is_regular() {
+        bail!("the session ended early: {}", finished.end);
+    }
+    Ok(code)
+}
+
+/// Watches a session to its end, with a live line.
+fn follow(mut running: Running, scene: Arc<Scene>) -> Result<(Finished, Recorded)> {
+    let mut recorder = Recorder::new(scene);
+    let mut line = LiveLine::new();
+    while !running.is_over() && !progress::interrupted() {
+        std::thread::sleep(LOOK);
+        running.drain(&mut |told| match told {
+            Told::Tick(tick) => {
+                line.tick(tick);
+                recorder.tick(tick);
+            }
+            Told::Pass(pass) => {
+                line.pass(pass);
+                recorder.pass(pass);
+            }
+        });
+        line.show(&running)?;
+    }
+    let finished = running.stop();
+    line.end()?;
+    finished.records.iter().for_each(|r| recorder.tick(r));
+    finished.passes.iter().for_each(|p| recorder.pass(p));
+    let bar = progress::bar(1000, "measuring depths");
+    let recorded = recorder.finish(&mut |share| {
+        bar.set_position((share * 1000.0) as u64);
+        true
+    });
+    bar.finish_and_clear();
+    Ok((finished, recorded))
+}
+
+/// What happens, every half a second, on a terminal.
+struct LiveLine {
+    shown: bool,
+    last: Instant,
+    ticks: u64,
+    force: f64,
+    depth: f64,
+}
+
+impl LiveLine {
+    fn new() -> Self {
+        let shown = std::io::stderr().is_terminal();
+        Self { shown, last: Instant::now(), ticks: 0, force: 0.0, depth: f64::NEG_INFINITY }
+    }
+
+    fn tick(&mut self, record: &TickRecord) {
+        self.ticks += 1;
+        self.force = self.force.max(record.result.command.force.norm());
+    }
+
+    fn pass(&mut self, record: &PassRecord) {
+        self.depth = self.depth.max(-record.min_distance);
+    }
+
+    fn show(&mut self, running: &Running) -> std::io::Result<()> {
+        let passed = self.last.elapsed();
+        if passed < LINE {
+            return Ok(());
+        }
+        if self.shown {
+            let rate = self.ticks as f64 / passed.as_secs_f64();
+            let depth = if self.depth.is_finite() {
+                format!("{:+.3} mm", self.depth * 1e3)
+            } else {
+                "far".to_owned()
+            };
+            let timing = running.timing();
+            let mut out = std::io::stderr().lock();
+            write!(
+                out,
+                "\r{:7.1} s  {rate:6.0} Hz  force {:6.2} N  depth {depth:>10}  contacts {:.1} ms old  missed {}   ",
+                timing.ticks as f64 * running.scene().time_step,
+                self.force,
+                timing.contact_age.quantile_ns(0.5) as f64 * 1e-6,
+                timing.missed
+            )?;
+            out.flush()?;
+        }
+        *self = Self { last: Instant::now(), ticks: 0, force: 0.0, depth: f64::NEG_INFINITY, ..*self };
+        Ok(())
+    }
+
+    fn end(&self) -> std::io::Result<()> {
+        if self.shown { writeln!(std::io::stderr()) } else { Ok(()) }
+    }
+}
+
+/// The summary's lines on timing.
+pub fn print_timing(out: &mut impl Write, live: &Live) -> std::io::Result<()> {
+    let timing = &live.timing;
+    let us = |ns: u64| ns as f64 * 1e-3;
+    let late = &timing.lateness;
+    writeln!(
+        out,
+        "  {} ticks, {} deadlines missed; {:.2} % at most 50 us late; lateness 99 % {:.1} us, 99.9 % {:.1} us, greatest {:.1} us",
+        timing.ticks,
+        timing.missed,
+        late.share_up_to(50_000) * 100.0,
+        us(late.quantile_ns(0.99)),
+        us(late.quantile_ns(0.999)),
+        us(late.greatest_ns)
+    )?;
+    let bare = &timing.bare_lateness;
+    if bare.count > 0 {
+        writeln!(
+            out,
+            "  a bare loop between the ticks: {:.2} % at most 50 us late; 99 % {:.1} us, 99.9 % {:.1} us, greatest {:.1} us",
+            bare.share_up_to(50_000) * 100.0,
+            us(bare.quantile_ns(0.99)),
+            us(bare.quantile_ns(0.999)),
+            us(bare.greatest_ns)
+        )?;
+    }
+    writeln!(
+        out,
+        "  a tick computes for {:.1} us (99 %: {:.1} us); a contact pass takes {:.0} us (99 %: {:.0} us); contacts are {:.1} ms old (99 %: {:.1} ms)",
+        us(timing.compute.quantile_ns(0.5)),
+        us(timing.compute.quantile_ns(0.99)),
+        us(timing.pass.quantile_ns(0.5)),
+        us(timing.pass.quantile_ns(0.99)),
+        us(timing.contact_age.quantile_ns(0.5)) * 1e-3,
+        us(timing.contact_age.quantile_ns(0.99)) * 1e-3
+    )?;
+    writeln!(out, "  haptic thread: {}; memory: {}", live.grants.priority, live.grants.memory)
+}

@@ -1,0 +1,275 @@
+//! Contacts at levels of detail against exact ones and against parry3d: `cargo bench -p hapteron-collision --bench clod`.
+//!
+//! Time per query along a 1 kHz motion (30 queries from one pose to the next; mean and 95 %), contacts, samples looked at, total weight over
+//! the number of exact contacts, error of the total penalty force (all contacts k (d + depth) n, against exact, rms over the motion), and the
+//! greatest error of the least distance. One core. Thresholds are shares of the body's radius.
+#![allow(clippy::unwrap_used)]
+
+use hapteron_collision::clod::{Detail, Hierarchy, Lod, LodWorkspace, query_levels};
+use hapteron_collision::mesh::{TriMesh, load};
+use hapteron_collision::{Contact, Surface};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use std::path::Path;
+use std::time::Instant;
+
+/// Steps of a 1 kHz motion between two poses, which are 30 ms apart.
+const STEPS: usize = 30;
+const THRESHOLDS: [f64; 4] = [0.0, 0.025, 0.01, 0.004];
+
+struct Pair {
+    name: &'static str,
+    body: TriMesh,
+    obstacle: TriMesh,
+    tolerance: f64,
+    poses: Vec<Isometry3<f64>>,
+}
+
+fn main() {
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    println!(
+        "{:<14} {:>9} {:>6} {:>9} {:>10} {:>10} {:>8} {:>8} {:>7} {:>9} {:>10}",
+        "pair",
+        "triangles",
+        "d mm",
+        "threshold",
+        "mean ms",
+        "95 % ms",
+        "contacts",
+        "samples",
+        "weight",
+        "force err",
+        "dist err mm"
+    );
+    for make in [spheres_40k, spheres_400k, jaws, tooth_rows, nut_bolt, peg_hole, spoon_mug] {
+        if let Some(pair) = make()
+            && (wanted.is_empty() || wanted.iter().any(|w| w == pair.name))
+        {
+            measure(&pair);
+        }
+    }
+}
+
+fn measure(pair: &Pair) {
+    let surfaces = [&pair.body, &pair.obstacle].map(Surface::build);
+    let folder = std::env::temp_dir().join("hapteron-bench-cache");
+    let [body, obstacle] = surfaces.each_ref().map(|surface| {
+        hapteron_collision::clod::cache::load_or_build(surface, Some(&folder), &mut |_| true).unwrap().0
+    });
+    let lod = |k: usize, hierarchy| Lod { surface: &surfaces[k], hierarchy };
+    let (body, obstacle): (Lod<'_>, Lod<'_>) = (lod(0, &body), lod(1, &obstacle));
+    let motion: Vec<Isometry3<f64>> = pair
+        .poses
+        .windows(2)
+        .flat_map(|w| (0..STEPS).map(|k| w[0].lerp_slerp(&w[1], k as f64 / STEPS as f64)).collect::<Vec<_>>())
+        .collect();
+    let mut exact: Vec<(Vector3<f64>, f64, usize)> = Vec::new();
+    for share in THRESHOLDS {
+        let detail = Detail::threshold(share * body.hierarchy.radius());
+        let mut workspace = LodWorkspace::new();
+        let (mut times, mut contacts, mut samples) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut wrong, mut all, mut weight, mut count, mut distance) = (0.0, 0.0, 0.0, 0.0, 0.0f64);
+        for (i, pose) in motion.iter().enumerate() {
+            let started = Instant::now();
+            let found = query_levels(
+                body,
+                pose,
+                obstacle,
+                &Isometry3::identity(),
+                pair.tolerance,
+                &detail,
+                &mut workspace,
+            );
+            times.push(started.elapsed().as_secs_f64());
+            let force = force(found.contacts, pair.tolerance);
+            let least = found.min_distance;
+            contacts.push(found.contacts.len() as f64);
+            if share == 0.0 {
+                exact.push((force, least, found.contacts.len()));
+            }
+            wrong += (force - exact[i].0).norm_squared();
+            all += exact[i].0.norm_squared();
+            weight += found.contacts.iter().map(|c| c.weight).sum::<f64>();
+            count += exact[i].2 as f64;
+            if exact[i].1.is_finite() && least.is_finite() {
+                distance = distance.max((least - exact[i].1).abs());
+            }
+            samples.push(workspace.samples().iter().sum::<usize>() as f64);
+        }
+        println!(
+            "{:<14} {:>9} {:>6} {:>8}% {:>10.4} {:>10.4} {:>8.0} {:>8.0} {:>7.3} {:>8.1}% {:>10.5}",
+            pair.name,
+            pair.body.triangles().len() + pair.obstacle.triangles().len(),
+            pair.tolerance * 1e3,
+            share * 100.0,
+            times.iter().sum::<f64>() / times.len() as f64 * 1e3,
+            quantile(&mut times, 0.95) * 1e3,
+            quantile(&mut contacts, 0.5),
+            quantile(&mut samples, 0.5),
+            weight / f64::max(count, 1.0),
+            100.0 * f64::sqrt(wrong / f64::max(all, f64::MIN_POSITIVE)),
+            distance * 1e3,
+        );
+    }
+    if !std::env::args().any(|a| a == "--no-peer") {
+        println!("{:<14} parry3d: {:.2} ms", pair.name, peer(pair, &motion) * 1e3);
+    }
+    let _: &Hierarchy = body.hierarchy;
+}
+
+/// Direction and size of the sum of all penalty forces, for a stiffness of 1.
+fn force(contacts: &[Contact], tolerance: f64) -> Vector3<f64> {
+    contacts.iter().map(|c| -c.normal * (c.weight * (tolerance + c.depth).max(0.0))).sum()
+}
+
+fn quantile(values: &mut [f64], share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[((values.len() - 1) as f64 * share) as usize]
+}
+
+/// Median time of parry3d's contact manifolds, with its workspace kept, on a few pieces of the motion.
+fn peer(pair: &Pair, motion: &[Isometry3<f64>]) -> f64 {
+    use parry3d_f64::math::{Pose, Rotation, Vector};
+    use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+    let shape = |mesh: &TriMesh| {
+        let vertices = mesh.vertices().iter().map(|p| Vector::new(p[0], p[1], p[2])).collect();
+        parry3d_f64::shape::TriMesh::new(vertices, mesh.triangles().to_vec()).unwrap()
+    };
+    let (body, obstacle) = (shape(&pair.body), shape(&pair.obstacle));
+    let mut manifolds: Vec<ContactManifold<(), ()>> = Vec::new();
+    let mut workspace = None;
+    let mut times: Vec<f64> = motion
+        .chunks(15 * STEPS)
+        .flat_map(|c| &c[..10.min(c.len())])
+        .map(|pose| {
+            let (t, q) = (pose.translation.vector, pose.rotation.quaternion());
+            let rotation = Rotation::from_xyzw(q.i, q.j, q.k, q.w);
+            let inverse = Pose::from_parts(Vector::new(t.x, t.y, t.z), rotation).inverse();
+            let started = Instant::now();
+            let _ = DefaultQueryDispatcher.contact_manifolds(
+                &inverse,
+                &body,
+                &obstacle,
+                pair.tolerance,
+                &mut manifolds,
+                &mut workspace,
+            );
+            started.elapsed().as_secs_f64()
+        })
+        .collect();
+    quantile(&mut times, 0.5)
+}
+
+/// The upper jaw grinding on the lower one in full occlusion.
+fn jaws() -> Option<Pair> {
+    let [body, obstacle] = ["upper_jaw", "lower_jaw"].map(|name| hapteron::assets::builtin(name).unwrap());
+    let poses = (0..60)
+        .map(|i| {
+            let phase = f64::from(i) * 0.1;
+            let shift = Translation3::new(
+                4e-4 * phase.sin(),
+                3e-4 * (1.7 * phase).sin(),
+                1e-4 + 2e-4 * (0.6 * phase).cos(),
+            );
+            let turn = UnitQuaternion::from_euler_angles(0.003 * phase.cos(), 0.0, 0.01 * phase.sin());
+            Isometry3::from_parts(shift, turn)
+        })
+        .collect();
+    Some(Pair { name: "jaws", body, obstacle, tolerance: 1e-3, poses })
+}
+
+fn spheres_40k() -> Option<Pair> {
+    Some(spheres("spheres", 100))
+}
+
+fn spheres_400k() -> Option<Pair> {
+    Some(spheres("spheres x10", 316))
+}
+
+/// A bumpy sphere in a bumpy cavity, half a tolerance apart, of 4 n^2 triangles each.
+fn spheres(name: &'static str, n: u32) -> Pair {
+    let poses = (0..60)
+        .map(|i| {
+            let phase = f64::from(i) * 0.1;
+            let shift =
+                Translation3::new(3e-4 * phase.sin(), 3e-4 * (1.3 * phase).cos(), 2e-4 * (0.7 * phase).sin());
+            Isometry3::from_parts(shift, UnitQuaternion::from_euler_angles(0.0, 0.0, 0.005 * phase.sin()))
+        })
+        .collect();
+    Pair {
+        name,
+        body: sphere(n, 0.06, false),
+        obstacle: sphere(n, 0.06 + 7.5e-4, true),
+        tolerance: 1.5e-3,
+        poses,
+    }
+}
+
+fn sphere(n: u32, size: f64, cavity: bool) -> TriMesh {
+    let (rings, sectors) = (n + 1, 2 * n);
+    let mut vertices = vec![[0.0, 0.0, size]];
+    // The cavity's vertices stand between the sphere's.
+    let offset = if cavity { 0.5 } else { 0.0 };
+    for i in 1..rings {
+        let theta = core::f64::consts::PI * f64::from(i) / f64::from(rings);
+        for j in 0..sectors {
+            let phi = core::f64::consts::TAU * (f64::from(j) + offset) / f64::from(sectors);
+            let bump = 5e-4 * (14.0 * theta).sin() * (12.0 * phi).cos() * theta.sin();
+            let radius = size + bump;
+            vertices.push([
+                radius * theta.sin() * phi.cos(),
+                radius * theta.sin() * phi.sin(),
+                radius * theta.cos(),
+            ]);
+        }
+    }
+    vertices.push([0.0, 0.0, -size]);
+    let at = |i: u32, j: u32| 1 + (i - 1) * sectors + j % sectors;
+    let last = vertices.len() as u32 - 1;
+    let mut triangles = Vec::new();
+    for j in 0..sectors {
+        triangles.push([0, at(1, j), at(1, j + 1)]);
+        triangles.push([last, at(rings - 1, j + 1), at(rings - 1, j)]);
+        for i in 1..rings - 1 {
+            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    if cavity {
+        triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+    TriMesh::new(vertices, triangles).unwrap()
+}
+
+fn tooth_rows() -> Option<Pair> {
+    real_pair("tooth_rows")
+}
+
+fn nut_bolt() -> Option<Pair> {
+    real_pair("nut_bolt")
+}
+
+fn peg_hole() -> Option<Pair> {
+    real_pair("peg_hole")
+}
+
+fn spoon_mug() -> Option<Pair> {
+    real_pair("spoon_mug")
+}
+
+fn real_pair(name: &'static str) -> Option<Pair> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/queries").join(name);
+    if !folder.is_dir() {
+        println!("{name:<14} skipped: {} is not there", folder.display());
+        return None;
+    }
+    let [body, obstacle] = ["body", "obstacle"].map(|file| load(folder.join(format!("{file}.obj"))).unwrap());
+    let tolerance = std::fs::read_to_string(folder.join("tolerance.txt")).unwrap().trim().parse().unwrap();
+    let table = std::fs::read_to_string(folder.join("poses.csv")).unwrap();
+    let pose = |line: &str| {
+        let c: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
+        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(c[4], c[5], c[6], c[7]));
+        Isometry3::from_parts(Translation3::new(c[1], c[2], c[3]), rotation)
+    };
+    let poses = table.lines().skip(1).map(pose).collect();
+    Some(Pair { name, body, obstacle, tolerance, poses })
+}

@@ -1,0 +1,113 @@
+//! The cache against damage, staleness and contradiction.
+#![allow(clippy::unwrap_used)]
+
+use super::*;
+
+fn surface(height: f64) -> Surface {
+    let mut vertices = Vec::new();
+    let mut triangles = Vec::new();
+    for i in 0..12u32 {
+        for j in 0..12u32 {
+            let (x, y) = (f64::from(i) * 0.1, f64::from(j) * 0.1);
+            vertices.push([x, y, height * (5.0 * x).sin() * (4.0 * y).cos()]);
+            if i > 0 && j > 0 {
+                let [a, b, c, d] = [(i - 1) * 12 + j - 1, i * 12 + j - 1, i * 12 + j, (i - 1) * 12 + j];
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+    }
+    Surface::of_triangles(&vertices, &triangles)
+}
+
+fn build(surface: &Surface) -> Hierarchy {
+    Hierarchy::build(surface, &mut |_| true).unwrap()
+}
+
+/// Would catch a damaged file that is used: every byte is flipped in turn, and the file is cut short everywhere.
+#[test]
+fn no_damage_is_accepted() {
+    let surface = surface(0.05);
+    let good = build(&surface).to_bytes(&surface);
+    assert!(Hierarchy::from_bytes(&good, &surface).is_ok());
+    for at in 0..good.len() {
+        let mut bad = good.clone();
+        bad[at] ^= 1 << (at % 8);
+        assert!(Hierarchy::from_bytes(&bad, &surface).is_err(), "byte {at}");
+    }
+    for length in (0..good.len()).step_by(7) {
+        assert!(Hierarchy::from_bytes(&good[..length], &surface).is_err(), "length {length}");
+    }
+    let mut version = good.clone();
+    version[8] += 1;
+    assert_eq!(Hierarchy::from_bytes(&version, &surface), Err(Refused::OtherVersion));
+    assert_eq!(Hierarchy::from_bytes(&good, &super::tests::surface(0.06)), Err(Refused::OtherMesh));
+    assert_eq!(Hierarchy::from_bytes(b"solid cube", &surface), Err(Refused::NotAHierarchy));
+}
+
+/// Would catch contents that fit their checksum (somebody made them) and send a query out of bounds: whatever passes the
+/// checks must have every index in place, so walking through it must not panic.
+#[test]
+fn contradictions_are_found_behind_a_good_checksum() {
+    let surface = surface(0.05);
+    let good = build(&surface).to_bytes(&surface);
+    let body = &good[76..];
+    let mut refused = 0;
+    for at in 0..body.len() {
+        for change in [1u8, 0x80, 0xff] {
+            let mut bad = body.to_vec();
+            bad[at] ^= change;
+            match Hierarchy::from_body(&bad, &surface) {
+                Err(_) => refused += 1,
+                Ok(h) => walk(&h, &surface),
+            }
+        }
+    }
+    assert!(refused > body.len() / 4, "{refused} of {}", body.len());
+}
+
+fn walk(h: &Hierarchy, surface: &Surface) {
+    use crate::clod::range;
+    for node in &h.nodes {
+        let _ = &h.nodes[range(node.children)];
+        let hull = h.hull(node);
+        h.faces[range(node.faces)]
+            .iter()
+            .flatten()
+            .for_each(|&c| assert!(hull[usize::from(c)][0].is_finite()));
+        h.samples[range(node.samples)]
+            .iter()
+            .for_each(|s| assert!(surface.vertices[s.vertex as usize][0].is_finite()));
+        h.vertices[range(node.vertices)].iter().for_each(|&v| assert!((v as usize) < surface.vertices.len()));
+        h.triangles[range(node.triangles)]
+            .iter()
+            .for_each(|&t| assert!((t as usize) < surface.triangles.len()));
+    }
+}
+
+/// Would catch a cache that is not used, one that trusts a stale file, and leftovers of writing.
+#[test]
+fn files_are_made_used_and_replaced() {
+    let folder = std::env::temp_dir().join(format!("hapteron-cache-test-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    let surface = surface(0.05);
+    let get = || load_or_build(&surface, Some(&folder), &mut |_| true).unwrap();
+    let (built, origin) = get();
+    let path = file_in(&folder, &surface);
+    assert_eq!(origin, Origin::Built(path.clone()));
+    assert_eq!(get(), (built.clone(), Origin::Cached(path.clone())));
+    let mut bytes = std::fs::read(&path).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    std::fs::write(&path, bytes).unwrap();
+    assert_eq!(get(), (built.clone(), Origin::Rebuilt(path.clone(), Refused::Damaged)));
+    assert_eq!(get(), (built.clone(), Origin::Cached(path.clone())));
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1);
+    std::fs::remove_dir_all(&folder).unwrap();
+    // A folder that cannot be made: the hierarchy is there all the same.
+    std::fs::write(&folder, b"in the way").unwrap();
+    let (again, origin) = get();
+    assert!(matches!(origin, Origin::NotCached(_)));
+    assert_eq!(again, built);
+    std::fs::remove_file(&folder).unwrap();
+    assert!(matches!(load_or_build(&surface, None, &mut |_| true).unwrap().1, Origin::NotCached(_)));
+}

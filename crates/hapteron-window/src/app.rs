@@ -1,0 +1,255 @@
+//! The window: which page is shown, and what concerns all of them.
+
+use crate::live::{Live, Notice, Wanted};
+use crate::opening::{self, Opening, Source};
+use crate::recent::{self, Recent};
+use crate::start::StartPage;
+use crate::view::{Shown, View};
+use crate::widgets::Widgets;
+use crate::{Options, picture, theme};
+use eframe::egui::{self, Align2, RichText};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+
+/// How long a notice stays.
+const NOTICE: Duration = Duration::from_secs(7);
+/// Between two pictures.
+const FRAME: Duration = Duration::from_millis(15);
+
+/// The application.
+pub struct Window {
+    start: StartPage,
+    live: Option<Box<Live>>,
+    opening: Option<Opening>,
+    recent: Recent,
+    recent_file: Option<PathBuf>,
+    view: View,
+    shown: Shown,
+    widgets: Widgets,
+    notices: Vec<(Notice, Instant)>,
+    /// Frames to be drawn finely before a picture is taken of the next.
+    picture_in: Option<u32>,
+    /// What has become of pictures.
+    pictures: (Sender<Notice>, Receiver<Notice>),
+    /// A picture to be saved at a time, and then the end.
+    shot: Option<(Instant, PathBuf)>,
+    end_at: Option<Instant>,
+    frames: Frames,
+}
+
+/// Counts pictures.
+struct Frames {
+    count: u64,
+    since: Instant,
+}
+
+impl Window {
+    /// The window as it opens.
+    #[must_use]
+    pub fn new(ctx: &egui::Context, options: Options) -> Self {
+        theme::apply(ctx);
+        ctx.set_theme(match options.light {
+            Some(true) => egui::ThemePreference::Light,
+            Some(false) => egui::ThemePreference::Dark,
+            None => egui::ThemePreference::System,
+        });
+        let recent_file = recent::place();
+        let now = Instant::now();
+        let after = options.after.map(|seconds| now + Duration::from_secs_f64(seconds));
+        let shot = options.screenshot.map(|path| (after.unwrap_or(now + Duration::from_secs(3)), path));
+        let mut window = Self {
+            start: StartPage::default(),
+            live: None,
+            opening: None,
+            recent: Recent::load(recent_file.as_deref()),
+            recent_file,
+            view: View::default(),
+            shown: Shown::default(),
+            widgets: Widgets::new(options.widgets.as_deref()),
+            notices: Vec::new(),
+            picture_in: None,
+            pictures: channel(),
+            end_at: if shot.is_some() { None } else { after },
+            shot,
+            frames: Frames { count: 0, since: now },
+        };
+        if let Some(source) = options.open {
+            window.open(ctx, source);
+        }
+        window
+    }
+
+    /// Begins to read a scene.
+    pub fn open(&mut self, ctx: &egui::Context, source: Source) {
+        let ctx = ctx.clone();
+        match Opening::begin(source, move || ctx.request_repaint()) {
+            Ok(opening) => self.opening = Some(opening),
+            Err(problem) => self.start.complain(problem),
+        }
+    }
+
+    /// Takes over a scene that has been read.
+    fn take_opened(&mut self) {
+        let Some((source, result)) = self.opening.as_ref().and_then(|o| Some((o.source.clone(), o.done()?)))
+        else {
+            return;
+        };
+        self.opening = None;
+        match result.and_then(|opened| Live::start(opened).map_err(|e| e.to_string())) {
+            Ok(live) => {
+                if let Source::File(path) = &source {
+                    self.recent.add(path, self.recent_file.as_deref());
+                }
+                self.live = Some(Box::new(live));
+                self.frames = Frames { count: 0, since: Instant::now() };
+            }
+            Err(problem) => {
+                let text = format!("Cannot open {}: {problem}", source.name());
+                if self.live.is_some() {
+                    self.notices.push((Notice { text, bad: true }, Instant::now()));
+                } else {
+                    self.start.complain(text);
+                }
+            }
+        }
+    }
+
+    /// Files that were dropped on the window.
+    fn take_dropped(&mut self, ctx: &egui::Context) {
+        for path in dropped(ctx) {
+            if opening::is_mesh(&path) {
+                if let Some(live) = &mut self.live {
+                    live.stop();
+                }
+                self.live = None;
+                self.start.add_mesh(&path);
+            } else {
+                self.open(ctx, Source::File(path));
+            }
+        }
+    }
+
+    fn save_picture(&mut self, ctx: &egui::Context) {
+        let path = picture::free_name();
+        let tell = self.pictures.0.clone();
+        picture::ask(ctx, move |image| {
+            let notice = match picture::write(&image, &path) {
+                Ok(()) => Notice { text: format!("Saved {}", path.display()), bad: false },
+                Err(text) => Notice { text, bad: true },
+            };
+            let _ = tell.send(notice);
+        });
+    }
+
+    /// What was asked for on the command line: a picture, and the end.
+    fn follow_plan(&mut self, ctx: &egui::Context) {
+        let now = Instant::now();
+        // The picture is taken of a frame that has been drawn since it was known.
+        self.view.fine |= self.shot.as_ref().is_some_and(|(at, _)| now + Duration::from_millis(800) >= *at);
+        if self.shot.as_ref().is_some_and(|(at, _)| now >= *at)
+            && let Some((_, path)) = self.shot.take()
+        {
+            let again = ctx.clone();
+            picture::ask(ctx, move |image| {
+                if let Err(problem) = picture::write(&image, &path) {
+                    eprintln!("error: {problem}");
+                }
+                again.send_viewport_cmd(egui::ViewportCommand::Close);
+            });
+        }
+        if self.end_at.is_some_and(|at| now >= at) {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+    }
+
+    fn show_notices(&mut self, ctx: &egui::Context) {
+        while let Ok(notice) = self.pictures.1.try_recv() {
+            self.notices.push((notice, Instant::now()));
+        }
+        if let Some(live) = &mut self.live {
+            self.notices.extend(live.take_notices().into_iter().map(|n| (n, Instant::now())));
+        }
+        self.notices.retain(|(_, since)| since.elapsed() < NOTICE);
+        for (index, (notice, _)) in self.notices.iter().rev().take(4).enumerate() {
+            let offset = egui::vec2(0.0, 44.0 + 38.0 * index as f32);
+            egui::Area::new(egui::Id::unique(("notice", index))).anchor(Align2::CENTER_TOP, offset).show(
+                ctx,
+                |ui| {
+                    let mut frame = egui::Frame::popup(ui.style());
+                    if notice.bad {
+                        frame = frame.stroke(egui::Stroke::new(1.5, ui.visuals().error_fg_color));
+                    }
+                    frame.show(ui, |ui| {
+                        ui.set_max_width(760.0);
+                        ui.label(RichText::new(&notice.text));
+                    });
+                },
+            );
+        }
+    }
+}
+
+impl eframe::App for Window {
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        let ctx = ui.ctx().clone();
+        self.frames.count += 1;
+        self.take_opened();
+        self.take_dropped(&ctx);
+        let wanted = match &mut self.live {
+            Some(live) => live.ui(ui, &self.view, &mut self.shown, &mut self.widgets),
+            None => {
+                let busy = self.opening.as_ref().map(|o| &o.source);
+                if let Some(source) = self.start.ui(ui, &self.recent, busy, &mut self.widgets) {
+                    self.open(&ctx, source);
+                }
+                None
+            }
+        };
+        match wanted {
+            Some(Wanted::Scenes) => self.live = None,
+            Some(Wanted::Picture) => self.picture_in = Some(2),
+            None => {}
+        }
+        self.view.fine = self.picture_in.is_some();
+        match self.picture_in {
+            Some(0) => {
+                self.picture_in = None;
+                self.save_picture(&ctx);
+            }
+            Some(n) => self.picture_in = Some(n - 1),
+            None => {}
+        }
+        if ctx.input(|i| i.modifiers.command && i.key_pressed(egui::Key::Q)) {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+        self.show_notices(&ctx);
+        self.widgets.finish(ctx.pixels_per_point());
+        self.follow_plan(&ctx);
+        // A scene moves on by itself; the start page only with its plan.
+        let next = if self.live.is_some() { FRAME } else { Duration::from_millis(200) };
+        ctx.request_repaint_after(next);
+    }
+
+    fn on_exit(&mut self, gl: Option<&eframe::glow::Context>) {
+        if let Some(live) = &mut self.live {
+            live.stop();
+        }
+        if let Some(gl) = gl {
+            self.view.destroy(gl);
+        }
+        let seconds = self.frames.since.elapsed().as_secs_f64();
+        if self.live.is_some() && seconds > 1.0 {
+            let rate = self.frames.count as f64 / seconds;
+            if let Some(live) = &self.live {
+                eprintln!("{}", live.timing_line());
+            }
+            eprintln!("{} pictures in {seconds:.1} s: {rate:.1} a second", self.frames.count);
+        }
+    }
+}
+
+/// Paths of the files that were dropped since the last picture.
+fn dropped(ctx: &egui::Context) -> Vec<PathBuf> {
+    ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect())
+}

@@ -1,0 +1,118 @@
+//! What goes between the threads, and by which way: newest values through triple buffers, every record and command through bounded rings.
+//! Both are wait-free on both sides and allocate nothing after the start; no thread can hold another up, dead or alive.
+
+use super::telemetry::{PassRecord, TickRecord};
+use crate::scene::ContactModel;
+use crate::session::{Command, ContactLaw, ContactSnapshot};
+use hapteron_dynamics::{Handle, RigidBody, State};
+use rtrb::{Consumer, Producer, RingBuffer};
+use triple_buffer::{Input, Output, triple_buffer};
+
+/// Commands that may wait; one is applied a tick.
+const COMMANDS: usize = 256;
+
+/// Contacts, and the tick whose state they were found at.
+#[derive(Clone, Debug)]
+pub struct Found {
+    pub of_tick: u64,
+    pub snapshot: ContactSnapshot,
+}
+
+/// The state of a tick, as the contact thread needs it.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    pub of_tick: u64,
+    pub time: f64,
+    pub state: State,
+    pub handle: Handle,
+    pub body: RigidBody,
+    pub law: ContactLaw,
+    pub model: ContactModel,
+    /// When the next one is to be expected.
+    pub next_ns: u64,
+}
+
+/// The haptic thread's ends.
+pub(super) struct HapticEnd {
+    contacts: Output<Found>,
+    states: Input<Seen>,
+    latest: Input<TickRecord>,
+    records: Producer<TickRecord>,
+    commands: Consumer<Command>,
+}
+
+impl HapticEnd {
+    /// Real time.
+    pub fn newest_contacts(&mut self) -> &Found {
+        self.contacts.read()
+    }
+
+    /// Real time.
+    pub fn next_command(&mut self) -> Option<Command> {
+        self.commands.pop().ok()
+    }
+
+    /// Real time.
+    pub fn publish_state(&mut self, seen: &Seen) {
+        self.states.write(*seen);
+    }
+
+    /// Answers whether there was room for it. Real time.
+    pub fn publish_record(&mut self, record: &TickRecord) -> bool {
+        self.latest.write(*record);
+        self.records.push(*record).is_ok()
+    }
+}
+
+/// The contact thread's ends.
+pub(super) struct ContactsEnd {
+    pub states: Output<Seen>,
+    pub contacts: Input<Found>,
+    pub passes: Producer<PassRecord>,
+    /// For those who look on.
+    pub shown: Input<ContactSnapshot>,
+}
+
+/// The ends of whoever watches and steers.
+pub(super) struct OuterEnd {
+    pub latest: Output<TickRecord>,
+    pub records: Consumer<TickRecord>,
+    pub passes: Consumer<PassRecord>,
+    pub commands: Producer<Command>,
+    pub shown: Output<ContactSnapshot>,
+}
+
+/// Makes all ways, with memory that has been touched. `room` is how many records may wait to be drained.
+pub(super) fn exchange(
+    found: &Found,
+    seen: &Seen,
+    first: &TickRecord,
+    room: usize,
+) -> (HapticEnd, ContactsEnd, OuterEnd) {
+    let (contacts_in, contacts_out) = triple_buffer(found);
+    let (states_in, states_out) = triple_buffer(seen);
+    let (latest_in, latest_out) = triple_buffer(first);
+    let (shown_in, shown_out) = triple_buffer(&found.snapshot);
+    let (mut records_in, mut records_out) = RingBuffer::new(room);
+    let (passes_in, passes_out) = RingBuffer::new(room);
+    let (commands_in, commands_out) = RingBuffer::new(COMMANDS);
+    while records_in.push(*first).is_ok() {}
+    while records_out.pop().is_ok() {}
+    let haptic = HapticEnd {
+        contacts: contacts_out,
+        states: states_in,
+        latest: latest_in,
+        records: records_in,
+        commands: commands_out,
+    };
+    let contacts =
+        ContactsEnd { states: states_out, contacts: contacts_in, passes: passes_in, shown: shown_in };
+    let outer = OuterEnd {
+        latest: latest_out,
+        records: records_out,
+        passes: passes_out,
+        commands: commands_in,
+        shown: shown_out,
+    };
+    (haptic, contacts, outer)
+}

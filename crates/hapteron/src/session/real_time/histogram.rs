@@ -1,0 +1,174 @@
+//! A histogram of durations with fixed bins: recording one is a handful of instructions, without lock or allocation.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Bins in each factor of two: values are known to 1 part in 32.
+const PER_OCTAVE: usize = 32;
+const OCTAVE_BITS: u32 = PER_OCTAVE.trailing_zeros();
+/// From 2^5 to 2^37 ns (137 s); below, every nanosecond has a bin of its own, above is the last bin.
+const OCTAVES: usize = 32;
+const BINS: usize = PER_OCTAVE * (OCTAVES + 1);
+
+/// The bin of a duration.
+fn bin(ns: u64) -> usize {
+    if ns < PER_OCTAVE as u64 {
+        return ns as usize;
+    }
+    let octave = ns.ilog2() - OCTAVE_BITS;
+    let within = (ns >> octave) as usize - PER_OCTAVE;
+    (PER_OCTAVE * (octave as usize + 1) + within).min(BINS - 1)
+}
+
+/// Least duration of a bin.
+fn floor_of(bin: usize) -> u64 {
+    if bin < PER_OCTAVE {
+        return bin as u64;
+    }
+    let octave = bin / PER_OCTAVE - 1;
+    ((PER_OCTAVE + bin % PER_OCTAVE) as u64) << octave
+}
+
+/// One thread records, any thread looks.
+#[derive(Debug)]
+pub struct Histogram {
+    bins: Box<[AtomicU64]>,
+    count: AtomicU64,
+    total_ns: AtomicU64,
+    greatest_ns: AtomicU64,
+}
+
+impl Histogram {
+    /// Without a duration.
+    #[must_use]
+    pub fn new() -> Self {
+        let zero = || AtomicU64::new(0);
+        Self {
+            bins: (0..BINS).map(|_| zero()).collect(),
+            count: zero(),
+            total_ns: zero(),
+            greatest_ns: zero(),
+        }
+    }
+
+    /// Adds a duration; from one thread only, or counts are lost. Real time.
+    pub fn record(&self, ns: u64) {
+        // One writer: no need of a locked instruction.
+        let add = |cell: &AtomicU64, n: u64| {
+            cell.store(cell.load(Ordering::Relaxed).wrapping_add(n), Ordering::Relaxed);
+        };
+        if let Some(cell) = self.bins.get(bin(ns)) {
+            add(cell, 1);
+        }
+        add(&self.count, 1);
+        add(&self.total_ns, ns);
+        if ns > self.greatest_ns.load(Ordering::Relaxed) {
+            self.greatest_ns.store(ns, Ordering::Relaxed);
+        }
+    }
+
+    /// What has been recorded so far.
+    #[must_use]
+    pub fn distribution(&self) -> Distribution {
+        let counts: Vec<u64> = self.bins.iter().map(|c| c.load(Ordering::Relaxed)).collect();
+        Distribution {
+            count: counts.iter().sum(),
+            total_ns: self.total_ns.load(Ordering::Relaxed),
+            greatest_ns: self.greatest_ns.load(Ordering::Relaxed),
+            counts,
+        }
+    }
+}
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// How often which duration came.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Distribution {
+    counts: Vec<u64>,
+    /// How many.
+    pub count: u64,
+    /// Their sum.
+    pub total_ns: u64,
+    /// The greatest.
+    pub greatest_ns: u64,
+}
+
+impl Distribution {
+    /// The duration that a share (0 to 1) of all do not exceed, to 1 part in 32, nanoseconds; zero when there are none.
+    #[must_use]
+    pub fn quantile_ns(&self, share: f64) -> u64 {
+        let wanted = (share * self.count as f64).ceil().max(1.0) as u64;
+        let mut seen = 0;
+        for (i, count) in self.counts.iter().enumerate() {
+            seen += count;
+            // The last bin has no end.
+            if seen >= wanted && i + 1 < BINS {
+                return (floor_of(i + 1) - 1).min(self.greatest_ns);
+            }
+        }
+        self.greatest_ns
+    }
+
+    /// The share (0 to 1) of durations up to a bound, to the bin that it falls in; 1 when there are none.
+    #[must_use]
+    pub fn share_up_to(&self, ns: u64) -> f64 {
+        if self.count == 0 {
+            return 1.0;
+        }
+        let within: u64 = self.counts.iter().take(bin(ns) + 1).sum();
+        within as f64 / self.count as f64
+    }
+
+    /// Nanoseconds; zero when there are none.
+    #[must_use]
+    pub fn mean_ns(&self) -> f64 {
+        self.total_ns as f64 / self.count.max(1) as f64
+    }
+
+    /// The bins that hold anything: least duration in nanoseconds, and count.
+    pub fn bins(&self) -> impl Iterator<Item = (u64, u64)> {
+        self.counts.iter().enumerate().filter(|(_, c)| **c > 0).map(|(i, c)| (floor_of(i), *c))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Would catch bins that overlap, leave gaps or are wider than 1 part in 32.
+        #[test]
+        fn every_duration_is_in_the_bin_around_it(ns in 0u64..1 << 37) {
+            let i = bin(ns);
+            prop_assert!(floor_of(i) <= ns && ns < floor_of(i + 1));
+            prop_assert!((floor_of(i + 1) - floor_of(i)) * 32 <= floor_of(i).max(32));
+        }
+
+        /// Would catch a quantile that is off by a bin: against sorting.
+        #[test]
+        fn quantiles_are_those_of_the_sorted_durations(
+            mut all in prop::collection::vec(0u64..10_000_000, 1..500), share in 0.0..1.0f64
+        ) {
+            let histogram = Histogram::new();
+            all.iter().for_each(|ns| histogram.record(*ns));
+            all.sort_unstable();
+            let exact = all[((share * all.len() as f64).ceil().max(1.0) as usize - 1).min(all.len() - 1)];
+            let found = histogram.distribution().quantile_ns(share);
+            prop_assert!(found >= exact && found - exact <= exact / 32 + 1, "{found} {exact}");
+        }
+    }
+
+    #[test]
+    fn the_far_end_and_nothing_at_all_are_no_trouble() {
+        let histogram = Histogram::new();
+        assert_eq!(histogram.distribution().quantile_ns(0.5), 0);
+        histogram.record(u64::MAX / 2);
+        assert_eq!(histogram.distribution().quantile_ns(0.99), u64::MAX / 2);
+        assert_eq!(histogram.distribution().share_up_to(1000), 0.0);
+    }
+}

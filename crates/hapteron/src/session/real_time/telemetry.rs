@@ -1,0 +1,120 @@
+//! What the threads tell of themselves: one record of fixed size a tick and a pass, and histograms that anyone may look at while they run.
+
+use super::histogram::{Distribution, Histogram};
+use crate::session::{Command, Tick};
+use hapteron_device::DeviceSample;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// All of one tick.
+#[derive(Clone, Copy, Debug)]
+pub struct TickRecord {
+    /// Counted from 1 without gaps.
+    pub tick: u64,
+    /// `now` of the tick, seconds since the start.
+    pub time: f64,
+    /// What the device gave.
+    pub sample: DeviceSample,
+    /// A command that was applied before the tick.
+    pub command: Option<Command>,
+    /// What came of it.
+    pub result: Tick,
+    /// The tick whose state the contacts were found at; 0 is the start.
+    pub contacts_of: u64,
+    /// Contacts that the pass found, and planes made of them.
+    pub counts: (u32, u32),
+    /// From the deadline to the start of the tick; zero where the device sets the pace.
+    pub lateness_ns: u64,
+    /// From the start of the tick until its command was there.
+    pub compute_ns: u64,
+    /// Deadlines that passed by just before this tick.
+    pub missed: u64,
+}
+
+/// All of one contact pass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PassRecord {
+    /// The tick whose state it looked at; 0 is the start.
+    pub of_tick: u64,
+    /// How far ahead it looked, seconds; decides its margin.
+    pub ahead: f64,
+    /// Of the surfaces at that state, negative where they cross, metres.
+    pub min_distance: f64,
+    /// Contacts that it found.
+    pub contacts: u32,
+    /// How long it took.
+    pub duration_ns: u64,
+}
+
+/// Histograms and counts of a running session. Written by the threads, each by one of them.
+#[derive(Debug, Default)]
+pub struct Telemetry {
+    pub(super) period: Histogram,
+    pub(super) lateness: Histogram,
+    pub(super) bare_lateness: Histogram,
+    pub(super) compute: Histogram,
+    pub(super) contact_age: Histogram,
+    pub(super) pass: Histogram,
+    pub(super) missed: AtomicU64,
+    pub(super) ticks: AtomicU64,
+    pub(super) passes: AtomicU64,
+    pub(super) lost: AtomicU64,
+    pub(super) lost_passes: AtomicU64,
+    pub(super) repeated: AtomicU64,
+    pub(super) limited_by_device: AtomicU64,
+}
+
+/// Adds to a count that only the calling thread writes. Real time.
+pub(super) fn add(count: &AtomicU64, n: u64) {
+    count.store(count.load(Ordering::Relaxed) + n, Ordering::Relaxed);
+}
+
+/// A look at [`Telemetry`].
+#[derive(Clone, Debug, Default)]
+pub struct Timing {
+    /// From the start of one tick to the start of the next.
+    pub period: Distribution,
+    /// From a deadline to the start of its tick.
+    pub lateness: Distribution,
+    /// The same of a loop that does nothing, between the ticks of the same thread; empty unless it was asked for.
+    pub bare_lateness: Distribution,
+    /// From the start of a tick until its command.
+    pub compute: Distribution,
+    /// Of the state that contacts were found at, when a tick used them.
+    pub contact_age: Distribution,
+    /// Of a contact pass.
+    pub pass: Distribution,
+    /// Deadlines without a tick.
+    pub missed: u64,
+    /// Ticks made.
+    pub ticks: u64,
+    /// Contact passes made.
+    pub passes: u64,
+    /// Records for which there was no room, because nobody drained them.
+    pub lost: u64,
+    /// Ticks without a new device sample.
+    pub repeated: u64,
+    /// Ticks whose command the device did not display fully.
+    pub limited_by_device: u64,
+}
+
+impl Telemetry {
+    /// What has been recorded so far.
+    #[must_use]
+    pub fn timing(&self) -> Timing {
+        let count = |c: &AtomicU64| c.load(Ordering::Relaxed);
+        Timing {
+            period: self.period.distribution(),
+            lateness: self.lateness.distribution(),
+            bare_lateness: self.bare_lateness.distribution(),
+            compute: self.compute.distribution(),
+            contact_age: self.contact_age.distribution(),
+            pass: self.pass.distribution(),
+            missed: count(&self.missed),
+            ticks: count(&self.ticks),
+            passes: count(&self.passes),
+            lost: count(&self.lost) + count(&self.lost_passes),
+            repeated: count(&self.repeated),
+            limited_by_device: count(&self.limited_by_device),
+        }
+    }
+}

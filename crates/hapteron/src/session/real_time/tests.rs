@@ -1,0 +1,172 @@
+//! The haptic loop from inside.
+
+use super::*;
+use crate::scene::file::Method;
+use crate::scenes::spoon_in_cup;
+use crate::session::{Command, Gains};
+use hapteron_device::DeviceCommand;
+
+/// The haptic loop with both other ends of its exchange, and no thread.
+fn parts(scene: &Arc<Scene>) -> (Loop, exchange::ContactsEnd, exchange::OuterEnd) {
+    let settings = Settings::of(scene);
+    let haptic = HapticState::new(scene.start);
+    let sample = scene.trajectory.sample(0.0, scene.time_step);
+    let (_, found, _) = first_contacts(scene, &sample);
+    let seen = Seen {
+        of_tick: 0,
+        time: 0.0,
+        state: scene.start,
+        handle: handle_at(&sample),
+        body: scene.body,
+        law: settings.contact_law,
+        model: settings.contact_model,
+        next_ns: 0,
+    };
+    let first = first_record(&settings, &haptic, &sample, &found);
+    let (haptic_end, contacts, outer) = exchange(&found, &seen, &first, 4096);
+    let haptic_loop = Loop {
+        settings,
+        haptic,
+        ends: haptic_end,
+        shared: Arc::new(Shared::default()),
+        epoch_ns: 0,
+        period_ns: 1_000_000,
+        spin: clock::SPIN,
+        duration: None,
+        late_limit_ns: 0,
+        bare: false,
+        hook: None,
+        ticks: 0,
+        last: sample,
+        last_fresh_ns: 0,
+        last_time: 0.0,
+        last_start_ns: 0,
+    };
+    (haptic_loop, contacts, outer)
+}
+
+/// Would catch any allocation or release of memory on the way of a real-time tick: newest contacts, command, tick, histograms, record; a
+/// million times, with contacts that come and go and commands of every kind.
+#[test]
+fn a_million_rounds_allocate_nothing() {
+    let mut file = spoon_in_cup(0.01, 2e3, Method::BackwardEuler);
+    file.contact.max_clusters = Some(0);
+    let scene = Arc::new(Scene::from_file(file).unwrap());
+    let (mut haptic_loop, mut contacts, mut outer) = parts(&scene);
+    // Samples and contacts along the motion, forth and back.
+    let mut pass = ContactPass::new(&scene);
+    let prepared: Vec<(DeviceSample, ContactSnapshot)> = (0..650)
+        .map(|i| {
+            let sample = scene.trajectory.sample(f64::from(i) * 1e-3, 1e-3);
+            let record = outer.latest.read();
+            let state = record.result.after.state;
+            let mut snapshot = ContactSnapshot::empty(&scene.body, &state);
+            pass.run(&scene, &state, 0.3, f64::from(i) * 1e-3, &mut snapshot);
+            contacts.contacts.input_buffer_mut().snapshot.clone_from(&snapshot);
+            contacts.contacts.publish();
+            haptic_loop.round_at(&sample, f64::from(i) * 1e-3);
+            (sample, snapshot)
+        })
+        .collect();
+    let gains = Gains::of(&scene.coupling);
+    let commands = [
+        Command::coupling(&gains).unwrap(),
+        Command::mass(&scene, 0.011).unwrap(),
+        Command::gravity([0.0; 3]).unwrap(),
+        Command::Clutch(true),
+        Command::Clutch(false),
+        Command::Pause(true),
+        Command::Pause(false),
+        Command::Grasp(false),
+        Command::Grasp(true),
+        Command::Rearm,
+    ];
+    // Each of these puts the workspace elsewhere: after them the hand starts again where the body is at the beginning.
+    let start = haptic_loop.haptic;
+    let (mut touching, mut free, mut recorded) = (0u32, 0u32, 0u32);
+    let info = allocation_counter::measure(|| {
+        for i in 0..1_000_000usize {
+            let place = i % (2 * prepared.len());
+            let place = if place < prepared.len() { place } else { 2 * prepared.len() - 1 - place };
+            let (sample, snapshot) = &prepared[place];
+            contacts.contacts.input_buffer_mut().snapshot.clone_from(snapshot);
+            contacts.contacts.publish();
+            contacts.states.update();
+            if i % 20_000 == 10_000 {
+                let _ = outer.commands.push(commands[i / 20_000 % commands.len()]);
+            }
+            if i % 20_000 == 0 {
+                haptic_loop.haptic = start;
+            }
+            let command = haptic_loop.round_at(sample, i as f64 * 1e-3);
+            if command == DeviceCommand::zero() {
+                free += 1;
+            }
+            while let Ok(record) = outer.records.pop() {
+                recorded += 1;
+                touching += u32::from(record.result.step.contact.force.norm_squared() > 0.0);
+            }
+        }
+    });
+    assert_eq!((info.count_total, info.bytes_total), (0, 0));
+    assert!(touching > 100_000 && touching < 900_000, "{touching} ticks in contact");
+    assert!(recorded >= 1_000_000 && free > 1000, "{recorded} records, {free} without force");
+}
+
+/// Would catch records that block the loop, or go astray without being counted, when nobody drains them.
+#[test]
+fn records_that_nobody_drains_are_counted() {
+    let scene = Arc::new(Scene::from_file(spoon_in_cup(0.01, 2e3, Method::BackwardEuler)).unwrap());
+    let (mut haptic_loop, _contacts, mut outer) = parts(&scene);
+    let sample = scene.trajectory.sample(0.0, 1e-3);
+    for i in 0..5000 {
+        haptic_loop.round_at(&sample, f64::from(i) * 1e-3);
+    }
+    assert_eq!(haptic_loop.shared.telemetry.timing().lost, 5000 - 4096);
+    assert_eq!(outer.latest.read().tick, 5000);
+    assert_eq!(outer.records.slots(), 4096);
+}
+
+/// Would catch a torn or stale value between the threads: a writer and a reader as fast as they can. (Under ThreadSanitizer it also catches a data
+/// race: see docs/real-time.md.)
+#[test]
+fn snapshots_and_states_cross_whole_and_in_order() {
+    let scene = Arc::new(Scene::from_file(spoon_in_cup(0.01, 2e3, Method::BackwardEuler)).unwrap());
+    let (mut haptic_loop, contacts, mut outer) = parts(&scene);
+    let sample = scene.trajectory.sample(0.0, 1e-3);
+    let most = 20_000u64;
+    let stop = Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let stopped = Arc::clone(&stop);
+    let writer = thread::spawn(move || {
+        let mut contacts = contacts;
+        let mut last = 0;
+        let mut published = 0;
+        while !stopped.load(std::sync::atomic::Ordering::Relaxed) {
+            if !contacts.states.update() {
+                thread::yield_now();
+                continue;
+            }
+            let seen = *contacts.states.output_buffer();
+            assert!(seen.of_tick > last, "an old state came again");
+            last = seen.of_tick;
+            assert!(seen.time == seen.of_tick as f64 * 1e-3, "a state with another's time");
+            let found = contacts.contacts.input_buffer_mut();
+            (found.of_tick, found.snapshot.time) = (seen.of_tick, seen.time);
+            contacts.contacts.publish();
+            published += 1;
+        }
+        published
+    });
+    for i in 1..=most {
+        haptic_loop.round_at(&sample, i as f64 * 1e-3);
+        while let Ok(record) = outer.records.pop() {
+            let time = record.time - record.result.contact_age;
+            assert!((time - record.contacts_of as f64 * 1e-3).abs() < 1e-9, "a snapshot with another's time");
+        }
+        if i % 64 == 0 {
+            thread::yield_now();
+        }
+    }
+    stop.store(true, std::sync::atomic::Ordering::Relaxed);
+    assert!(writer.join().unwrap() > 10);
+}

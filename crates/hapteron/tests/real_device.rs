@@ -1,0 +1,90 @@
+//! A whole session with a driver, against an emulated device: the way of `hapteron run` with `[device] kind`.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::csv;
+use hapteron::device::drivers;
+use hapteron::scene::file::{Guard, Method};
+use hapteron::scene::{Changes, Scene};
+use hapteron::scenes::spoon_in_cup;
+use hapteron::session::real_time::{End, RealTime, RealTimeOptions, Recorder, Told};
+use hapteron::session::replay;
+use hapteron_emulators::{Generation, HaplyService};
+use nalgebra::Vector3;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The spoon in the cup, for whoever comes with a device.
+fn scene(service: &HaplyService) -> Scene {
+    let resolved = Scene::from_file(spoon_in_cup(0.01, 2e3, Method::BackwardEuler)).unwrap();
+    let mut file = resolved.file;
+    file.hand.trajectory = None;
+    // With nobody to feel it the scene had none.
+    file.guard = Guard::default();
+    file.device.kind = Some("haply".to_owned());
+    file.device.options.insert("address".to_owned(), service.address().to_owned().into());
+    file.device.options.insert("patience".to_owned(), 0.5.into());
+    (file.body.linear_velocity, file.body.angular_velocity) = (None, None);
+    Scene::from_file(file).unwrap()
+}
+
+/// Would catch a session that does not reach the device's hand, starts with a jerk because the handle is elsewhere, does not end when
+/// the device is gone, or cannot be made again from what it wrote.
+#[test]
+fn a_session_with_a_driver_pushes_the_hand_and_ends_with_the_device() {
+    let service = HaplyService::start(Generation::V35);
+    // Far from where the body is.
+    service.state().hand.target = Vector3::new(0.0, 0.05, 0.02);
+    let mut scene = scene(&service);
+    let (kind, options) = scene.driver().map(|(k, o)| (k.to_owned(), o)).unwrap();
+    let device = drivers::open(&kind, &options).unwrap();
+    scene.adopt(device.capabilities()).unwrap();
+    let limit = scene.guard.unwrap().max_force;
+    let scene = Arc::new(scene);
+    let options = RealTimeOptions { watchdog: Duration::from_secs(2), ..RealTimeOptions::of(&scene) };
+    let mut running = RealTime::start(Arc::clone(&scene), device, options).unwrap();
+    let mut recorder = Recorder::new(Arc::clone(&scene));
+    let (started, mut greatest, mut gone) = (Instant::now(), 0.0_f64, false);
+    let mut early = Vec::new();
+    while !running.is_over() && started.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(5));
+        running.drain(&mut |told| match told {
+            Told::Tick(tick) => {
+                if tick.tick <= 20 {
+                    early.push(tick.result.command.force.norm());
+                }
+                recorder.tick(tick);
+            }
+            Told::Pass(pass) => recorder.pass(pass),
+        });
+        let ticks = running.timing().ticks;
+        let mut state = service.state();
+        greatest = greatest.max(state.force.norm());
+        if ticks > 200 {
+            // The hand pulls the spoon's handle against the grip of the cup.
+            state.hand.target = Vector3::new(0.03, 0.05, 0.02);
+        }
+        if ticks > 1500 && !gone {
+            assert!(greatest > 0.5, "the hand felt {greatest} N");
+            state.hang_up = true;
+            gone = true;
+        }
+    }
+    let finished = running.stop();
+    assert!(matches!(finished.end, End::Device(_)), "{:?}", finished.end);
+    finished.records.iter().for_each(|r| recorder.tick(r));
+    finished.passes.iter().for_each(|p| recorder.pass(p));
+    let recorded = recorder.finish(&mut |_| true);
+    assert!(early.iter().all(|f| *f < 0.1), "the start was felt: {early:?}");
+    assert!(greatest <= limit, "{greatest} N");
+    assert!(recorded.recording.rows.iter().any(|r| r.contact[0].norm() > 0.3), "no contact");
+    let again = replay(&scene, &recorded.log, &mut |_| true).unwrap();
+    assert!(csv(&again) == csv(&recorded.recording), "made again it is different");
+    // The written scene, without the device, is enough.
+    let text = scene.to_toml().unwrap();
+    let written = Scene::parse(&text, "scene.toml", Path::new("."), &Changes::default()).unwrap();
+    let again = replay(&written, &recorded.log, &mut |_| true).unwrap();
+    assert!(csv(&again) == csv(&recorded.recording), "made again from the written scene it is different");
+}
