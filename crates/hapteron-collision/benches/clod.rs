@@ -41,10 +41,9 @@ fn main() {
         "dist err mm"
     );
     for make in [spheres_40k, spheres_400k, jaws, tooth_rows, nut_bolt, peg_hole, spoon_mug] {
-        if let Some(pair) = make() {
-            if wanted.is_empty() || wanted.iter().any(|w| w == pair.name) {
-                measure(&pair);
-            }
+        let pair = make().filter(|p| wanted.is_empty() || wanted.iter().any(|w| w == p.name));
+        if let Some(pair) = pair {
+            measure(&pair);
         }
     }
 }
