@@ -37,7 +37,7 @@ fn query_tells_distance_and_contacts() {
     assert_eq!(lines[3][2..], ["inf", "0"]);
     assert!(stderr(&output).contains("3 queries: median"), "{}", stderr(&output));
     let contacts = folder.read("c.csv");
-    assert!(contacts.starts_with("pose,px,py,pz,ox,oy,oz,nx,ny,nz,depth\n"));
+    assert!(contacts.starts_with("pose,px,py,pz,ox,oy,oz,nx,ny,nz,depth,weight\n"));
     let count: usize = lines[1][3].parse::<usize>().unwrap() + lines[2][3].parse::<usize>().unwrap();
     assert_eq!(contacts.lines().count(), count + 1);
     // From the cube at +x the other one lies towards -x.

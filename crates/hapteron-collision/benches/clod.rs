@@ -41,9 +41,8 @@ fn main() {
         "dist err mm"
     );
     for make in [spheres_40k, spheres_400k, jaws, tooth_rows, nut_bolt, peg_hole, spoon_mug] {
-        if let Some(pair) = make()
-            && (wanted.is_empty() || wanted.iter().any(|w| w == pair.name))
-        {
+        let pair = make().filter(|p| wanted.is_empty() || wanted.iter().any(|w| w == p.name));
+        if let Some(pair) = pair {
             measure(&pair);
         }
     }

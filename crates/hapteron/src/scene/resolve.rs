@@ -394,7 +394,7 @@ impl Resolver<'_> {
             stiffness,
             damping,
             tolerance,
-            detail: Detail::threshold(threshold * radius),
+            detail: Detail { force_from: Some(tolerance), ..Detail::threshold(threshold * radius) },
             max_clusters: *c.max_clusters.get_or_insert(0),
             cluster_radius: CLUSTER_RADIUS * model.surface.radius(),
             model: *c.model.get_or_insert(ContactModel::Planes),

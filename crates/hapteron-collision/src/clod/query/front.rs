@@ -55,7 +55,7 @@ pub(super) struct Tally {
     pub samples: usize,
     /// Vertices that they stand for.
     pub near: f64,
-    /// Vertices in contact; those at the tolerance count for half.
+    /// Vertices in contact, each as much as its force: those where force begins count for nothing.
     pub contact: f64,
 }
 
@@ -158,6 +158,8 @@ pub(super) fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>
     front.stack.push((0, 1.0));
     let mut tally = Tally::default();
     let reach = REACH * search.tolerance;
+    let force_from =
+        judge.detail.force_from.unwrap_or(search.tolerance).clamp(f64::MIN_POSITIVE, search.tolerance);
     while let Some((index, share)) = front.stack.pop() {
         if !front.is_near(front.centers[index as usize], search) {
             continue;
@@ -180,8 +182,8 @@ pub(super) fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>
             }
             if let Some((point, foot)) = front.foot_of(sample.vertex, search, reach) {
                 let beyond = foot.signed_distance.abs() - search.tolerance;
-                tally.contact +=
-                    f64::from(weight) * (0.5 - 0.5 * beyond / (reach - search.tolerance)).min(1.0);
+                let pressed = 1.0 - foot.signed_distance / force_from;
+                tally.contact += f64::from(weight) * pressed.clamp(0.0, 1.0);
                 if beyond <= 0.0 {
                     front.found.push(Found { vertex: sample.vertex, weight, point, foot });
                 }

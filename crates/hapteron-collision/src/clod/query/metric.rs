@@ -13,6 +13,8 @@ const HYSTERESIS: f64 = 0.8;
 pub struct Detail {
     /// s0, metres: 2.5 % of the object's radius in the paper. 0 means exact.
     pub threshold: f64,
+    /// Where force begins, metres, when that is closer than the tolerance of the query: only what is within it makes a contact large.
+    pub force_from: Option<f64>,
     /// Where surfaces move past each other quickly they may be as coarse as this many times the way that they move between
     /// two queries. 0: no such metric.
     pub per_step: f64,
@@ -50,7 +52,14 @@ impl Detail {
     /// Only a threshold, in metres.
     #[must_use]
     pub fn threshold(threshold: f64) -> Self {
-        Self { threshold, per_step: 0.0, view: None, combine: Combine::Any, budget_us: None }
+        Self {
+            threshold,
+            force_from: None,
+            per_step: 0.0,
+            view: None,
+            combine: Combine::Any,
+            budget_us: None,
+        }
     }
 
     /// Whether everything is to be exact.
@@ -145,9 +154,9 @@ impl Density {
 /// Of a new number of vertices in contact this share counts.
 const SMOOTHING: f64 = 0.1;
 /// Samples near the other surface are at most this many times as many as those wanted in contact.
-const NEAR_SAMPLES: f64 = 6.0;
+const NEAR_SAMPLES: f64 = 24.0;
 /// Samples wanted in contact on each surface, times the threshold as a share of the radius.
-const SAMPLES: f64 = 1.0;
+const SAMPLES: f64 = 1.6;
 
 fn wanted_samples(detail: &Detail, radius: f64) -> f64 {
     (SAMPLES * radius / detail.threshold).max(8.0)
