@@ -2,7 +2,7 @@
 //!
 //! The built-in jaws are always measured; the real pairs when their data are there. `cold`: each pose alone, with a workspace that knows nothing;
 //! `1 kHz`: along the motion, 30 queries from each pose to the next, with one workspace. Medians, milliseconds, one core. The peer lists every pair of close triangles.
-//! `B/tri`: memory of the two structures, bytes a triangle. Names of pairs as arguments choose among them.
+//! `B/tri`: memory of the two structures, bytes a triangle. Names of pairs as arguments choose among them; `--alone` leaves the peer out.
 #![allow(clippy::unwrap_used)]
 
 use hapteron_collision::mesh::{TriMesh, load};
@@ -75,7 +75,8 @@ fn measure(pair: &Pair) {
             start.elapsed().as_secs_f64()
         })
         .collect();
-    let [parry_cold, parry_warm] = peer(pair, &motion);
+    let alone = std::env::args().any(|a| a == "--alone");
+    let [parry_cold, parry_warm] = if alone { [f64::NAN; 2] } else { peer(pair, &motion) };
     let (cold, warm) = (median(cold) * 1e3, median(warm) * 1e3);
     println!(
         "{:<12} {:>6} {:>9} {:>7.1} {:>9.4} {:>9.4} {:>8.0} {:>10.3} {:>10.3} {:>6.1} {:>6.1}",

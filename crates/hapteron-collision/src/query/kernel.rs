@@ -2,7 +2,7 @@
 //! lane is the same IEEE arithmetic on any machine.
 
 use crate::surface::{LANES, Node, Surface, TriangleBlock};
-use crate::vector::Rigid;
+use crate::vector::{Rigid, Vec3};
 
 /// An axis-aligned box in single precision, rounded outward.
 #[derive(Clone, Copy, Debug)]
@@ -12,6 +12,23 @@ pub(super) struct Box32 {
 }
 
 impl Box32 {
+    /// Around two points, rounded outward.
+    #[inline(always)]
+    pub(super) fn around(a: Vec3, b: Vec3, slack: f32) -> Self {
+        let mut result = Self { min: [0.0; 3], max: [0.0; 3] };
+        for axis in 0..3 {
+            result.min[axis] = a[axis].min(b[axis]) as f32 - slack;
+            result.max[axis] = a[axis].max(b[axis]) as f32 + slack;
+        }
+        result
+    }
+
+    /// A lower bound of the distance to another box; not positive where they overlap.
+    #[inline(always)]
+    pub(super) fn apart(&self, min: &[f32; 3], max: &[f32; 3]) -> f32 {
+        (0..3).map(|k| (self.min[k] - max[k]).max(min[k] - self.max[k])).fold(f32::NEG_INFINITY, f32::max)
+    }
+
     #[inline(always)]
     pub(super) fn overlaps(&self, min: &[f32; 3], max: &[f32; 3]) -> bool {
         let mut apart = false;
@@ -101,6 +118,23 @@ pub(super) fn overlapping_children(node: &Node, b: &Box32) -> u32 {
         hit[l] = u32::from(!apart) << l;
     }
     hit.iter().fold(0, |mask, h| mask | h)
+}
+
+/// Lower bounds of the squared distances of a point to a node's children.
+#[inline(always)]
+pub(super) fn children_squared(node: &Node, p: [f32; 3], slack: f32) -> [f32; LANES] {
+    let mut squared = [0.0; LANES];
+    for l in 0..LANES {
+        let mut sum = 0.0;
+        for k in 0..3 {
+            let (under, over) = (node.min[k][l] - p[k], p[k] - node.max[k][l]);
+            let beyond = (if under > over { under } else { over }) - slack;
+            let beyond = if beyond > 0.0 { beyond } else { 0.0 };
+            sum += beyond * beyond;
+        }
+        squared[l] = sum;
+    }
+    squared
 }
 
 /// The boxes of a node's children after a rigid motion, each grown by `margin` on all sides.

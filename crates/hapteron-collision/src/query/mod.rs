@@ -7,8 +7,10 @@
 //! closer than the tolerance with one contact at each vertex there, and its least distance is the exact one, at a
 //! fraction of the cost of listing all pairs of close triangles.
 
+mod deep;
 pub(crate) mod feature;
 mod kernel;
+mod nearest;
 mod result;
 mod ridge_kernel;
 mod ridges;
@@ -55,6 +57,7 @@ pub struct QueryWorkspace {
     walk: Walk,
     collected: Option<Collected>,
     ridges: ridges::Ridges,
+    deep: deep::Memory,
     body: side::Side,
     obstacle: side::Side,
     scratch: vertices::Scratch,
@@ -107,10 +110,13 @@ impl QueryWorkspace {
         };
         let reach = pair.tolerance + ahead;
         walk::walk(pair, reach, &mut self.walk);
+        let [body_apart, obstacle_apart] = self.deep.apart.each_mut();
         for (clear, neighbours) in [
             (&mut self.body.clear, &self.walk.body),
             (&mut self.obstacle.clear, &self.walk.obstacle),
             (&mut self.ridges.clear, &self.walk.body),
+            (body_apart, &self.walk.body),
+            (obstacle_apart, &self.walk.obstacle),
         ] {
             clear.clear();
             clear.resize(neighbours.of.len(), side::Clear::UNKNOWN);
@@ -155,8 +161,16 @@ pub fn query<'a>(
     let inverse = Rigid::from_isometry(&relative.inverse());
     let mut pair = Pair { body, obstacle, motion: &motion, inverse: &inverse, tolerance, travelled: 0.0 };
     pair.travelled = workspace.collect(pair);
-    let QueryWorkspace { walk, ridges, body: body_side, obstacle: obstacle_side, scratch, contacts, .. } =
-        workspace;
+    let QueryWorkspace {
+        walk,
+        ridges,
+        deep,
+        body: body_side,
+        obstacle: obstacle_side,
+        scratch,
+        contacts,
+        ..
+    } = workspace;
     body_side.clear();
     obstacle_side.clear();
     ridges.forget(obstacle);
@@ -165,6 +179,8 @@ pub fn query<'a>(
     vertices::of_body(pair, &walk.body, body_side, scratch, &mut sink);
     vertices::of_obstacle(pair, &walk.obstacle, obstacle_side, scratch, &mut sink);
     ridges::find(pair, &walk.body, [body_side, obstacle_side], ridges, &mut sink);
+    deep::of_body(pair, &walk.body, body_side, deep, &mut sink);
+    deep::of_obstacle(pair, &walk.obstacle, obstacle_side, deep, &mut sink);
     let min_distance = sink.least;
     QueryResult { min_distance, contacts: &workspace.contacts }
 }

@@ -28,6 +28,12 @@ pub(super) struct Sink<'a> {
 }
 
 impl Sink<'_> {
+    /// Puts the contacts from number `first` on in the order of their features: what finds them goes by near leaves, and the order of
+    /// those depends on how far ahead the walk looked.
+    pub(super) fn sort_from(&mut self, first: usize) {
+        self.contacts[first..].sort_unstable_by_key(|c| (c.body_feature, c.obstacle_feature));
+    }
+
     #[inline(always)]
     pub(super) fn push(&mut self, found: Found) {
         self.least = self.least.min(-found.depth);

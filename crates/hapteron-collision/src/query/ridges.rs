@@ -187,8 +187,7 @@ pub(super) fn find(
             ridges.clear[i] = Clear::new(f64::from(lower), pair.travelled);
         }
     }
-    // The order of near leaves depends on how far ahead the walk looked.
-    sink.contacts[first..].sort_unstable_by_key(|c| (c.body_feature, c.obstacle_feature));
+    sink.sort_from(first);
 }
 
 #[inline(always)]
@@ -274,25 +273,27 @@ fn judge(pair: Pair<'_>, ridge: &Ridge, other: u32, within: f64, crossing: f64) 
 fn faces_cross(pair: Pair<'_>, ridge: &Ridge, mine: &Edge, theirs: &Edge, start: Vec3, along: Vec3) -> bool {
     let corners =
         |surface: &Surface, t: u32| surface.triangles[t as usize].map(|v| surface.vertices[v as usize]);
-    theirs.triangles.iter().any(|&t| pierces(ridge.start, ridge.along, corners(pair.obstacle, t)))
+    theirs.triangles.iter().any(|&t| pierces(ridge.start, ridge.along, corners(pair.obstacle, t)).is_some())
         || mine
             .triangles
             .iter()
-            .any(|&t| pierces(start, along, corners(pair.body, t).map(|v| pair.motion.point(v))))
+            .any(|&t| pierces(start, along, corners(pair.body, t).map(|v| pair.motion.point(v))).is_some())
 }
 
-/// True when the segment from `p` along `d` meets the triangle.
-pub(super) fn pierces(p: Vec3, d: Vec3, [a, b, c]: [Vec3; 3]) -> bool {
+/// Where the segment from `p` along `d` meets the triangle, as a share of `d`.
+#[inline(always)]
+pub(super) fn pierces(p: Vec3, d: Vec3, [a, b, c]: [Vec3; 3]) -> Option<f64> {
     let (e1, e2, from) = (sub(b, a), sub(c, a), sub(p, a));
     let normal = cross(e1, e2);
-    let slope = -dot(d, normal);
-    if slope == 0.0 {
-        return false;
+    let (height, slope) = (dot(from, normal), -dot(d, normal));
+    // Both ends on one side of the plane: most are refused here, without a division.
+    let apart = if slope > 0.0 { height < 0.0 || height > slope } else { height > 0.0 || height < slope };
+    if apart || slope == 0.0 {
+        return None;
     }
-    let t = dot(from, normal) / slope;
     let moment = cross(d, from);
-    // Signs by Cramer's rule; t is exact enough even at a grazing angle since both its parts are.
+    // Signs by Cramer's rule; the share is exact enough even at a grazing angle since both its parts are.
     let v = -dot(e2, moment) / slope;
     let w = dot(e1, moment) / slope;
-    (0.0..=1.0).contains(&t) && v >= 0.0 && w >= 0.0 && v + w <= 1.0
+    (v >= 0.0 && w >= 0.0 && v + w <= 1.0).then_some(height / slope)
 }

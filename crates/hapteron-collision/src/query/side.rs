@@ -64,6 +64,11 @@ impl Side {
         self.found.clear();
     }
 
+    /// Vertices with a signed distance, in the order found.
+    pub(super) fn found(&self) -> &[u32] {
+        &self.found
+    }
+
     #[inline(always)]
     fn page(&self, vertex: u32) -> Option<&Page> {
         let page = self.pages[vertex as usize / PAGE].checked_sub(1)?;

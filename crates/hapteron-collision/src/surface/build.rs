@@ -59,6 +59,9 @@ pub(super) fn surface(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Surface {
         triangles,
         triangle_edges,
         edges,
+        edges_at_begin: Vec::new(),
+        edges_at: Vec::new(),
+        closed: false,
         blocks: Vec::new(),
         leaves: Vec::new(),
         nodes: Vec::new(),
@@ -66,6 +69,8 @@ pub(super) fn surface(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Surface {
         identity: 0,
     };
     renumber(&mut result, &builder);
+    (result.edges_at_begin, result.edges_at) = topology::edges_at(result.vertices.len(), &result.edges);
+    result.closed = result.edges.iter().all(|e| matches!(e.kind, EdgeKind::Convex | EdgeKind::Hollow));
     result.nodes = collapse(&builder.branches);
     result.identity = digest(&result);
     result

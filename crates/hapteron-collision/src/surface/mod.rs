@@ -142,6 +142,12 @@ pub struct Surface {
     /// Edge opposite to nothing in particular: edge `k` of a triangle runs from its vertex `k` to vertex `k + 1`.
     pub(crate) triangle_edges: Vec<[u32; 3]>,
     pub(crate) edges: Vec<Edge>,
+    /// By vertex, and one more: where its range of `edges_at` begins.
+    pub(crate) edges_at_begin: Vec<u32>,
+    /// The edges at each vertex.
+    pub(crate) edges_at: Vec<u32>,
+    /// No rim, no edge with more than two faces or with two of opposite orientation: it has an inside.
+    pub(crate) closed: bool,
     pub(crate) blocks: Vec<TriangleBlock>,
     pub(crate) leaves: Vec<Leaf>,
     /// The root is the first.
@@ -161,6 +167,12 @@ impl Surface {
     /// The same for triangles that are known to be sound.
     pub(crate) fn of_triangles(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Self {
         build::surface(vertices, triangles)
+    }
+
+    /// The edges that end at a vertex.
+    pub(crate) fn edges_at(&self, vertex: u32) -> &[u32] {
+        let [begin, end] = [0, 1].map(|k| self.edges_at_begin[vertex as usize + k] as usize);
+        &self.edges_at[begin..end]
     }
 
     /// Triangles in the structure: those of the mesh less the ones whose corners coincide.
@@ -187,6 +199,8 @@ impl Surface {
             + bytes(&self.triangles)
             + bytes(&self.triangle_edges)
             + bytes(&self.edges)
+            + bytes(&self.edges_at_begin)
+            + bytes(&self.edges_at)
             + bytes(&self.blocks)
             + bytes(&self.leaves)
             + bytes(&self.nodes)

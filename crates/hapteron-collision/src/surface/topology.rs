@@ -120,6 +120,27 @@ fn edge(
     }
 }
 
+/// The edges at each vertex: where each vertex's range begins, and the edges.
+pub(super) fn edges_at(vertices: usize, edges: &[Edge]) -> (Vec<u32>, Vec<u32>) {
+    let mut begin = vec![0u32; vertices + 1];
+    for v in edges.iter().flat_map(|e| e.vertices) {
+        begin[v as usize + 1] += 1;
+    }
+    for i in 0..vertices {
+        begin[i + 1] += begin[i];
+    }
+    let mut next = begin.clone();
+    let mut list = vec![0u32; 2 * edges.len()];
+    for (edge, ends) in edges.iter().map(|e| e.vertices).enumerate() {
+        for v in ends {
+            let place = &mut next[v as usize];
+            list[*place as usize] = edge as u32;
+            *place += 1;
+        }
+    }
+    (begin, list)
+}
+
 /// Angle-weighted vertex normals with their cones.
 pub(super) fn vertex_normals(
     vertices: &[Vec3],
