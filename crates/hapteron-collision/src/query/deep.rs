@@ -7,15 +7,17 @@
 
 use super::Pair;
 use super::feature::{Feature, Foot};
-use super::kernel::{self, Box32};
+use super::kernel;
 use super::nearest::Nearest;
 use super::result::{Found, Sink};
+use super::ridge_kernel::SegmentBlock;
 use super::ridges::pierces;
 use super::side::{Clear, Side};
 use super::vertices::{push_body_vertex, push_obstacle_vertex};
-use super::walk::{Neighbourhood, Neighbours, Slab};
+use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{LANES, Surface};
 use crate::vector::{Rigid, Vec3, add, dot, norm, scale, sub};
+use std::ops::Range;
 
 /// Lists to be reused.
 #[derive(Clone, Debug, Default)]
@@ -24,12 +26,11 @@ pub(super) struct Memory {
     open: Vec<u32>,
     /// Edges that run through an odd number of faces: one end is inside, the other outside.
     crossed: Vec<u32>,
-    /// Edges of a leaf that may run through something no vertex shows.
-    long: Vec<u32>,
-    /// Leaves of the other surface that one leaf may cross.
-    touching: Vec<u32>,
-    /// Where one edge runs through faces, as shares of it.
-    crossings: Vec<f64>,
+    /// Edges of a leaf that may run through something no vertex shows, and eight at a time.
+    probes: Vec<Probe>,
+    segments: Vec<SegmentBlock>,
+    /// Which of them run through faces, and where, as a share of the edge.
+    crossings: Vec<(u32, f64)>,
     nearest: Nearest,
     /// By neighbourhood of the last walk, for the body and the obstacle: until when no leaf can touch it.
     pub apart: [Vec<Clear>; 2],
@@ -40,6 +41,14 @@ pub(super) struct Memory {
 enum Inside {
     Vertex(u32, Vec3),
     Edge(u32, Vec3),
+}
+
+/// An edge, and where it is in the other surface's frame.
+#[derive(Clone, Copy, Debug)]
+struct Probe {
+    edge: u32,
+    start: Vec3,
+    along: Vec3,
 }
 
 /// One surface in the other one.
@@ -123,21 +132,16 @@ fn run(
         if memory.apart[dive.which][i].holds(dive.travelled, 0.0) {
             continue;
         }
-        long_edges(dive, leaf, side, &mut memory.long);
-        if memory.long.is_empty() {
-            continue;
-        }
-        let near = &neighbours.near[begin as usize..end as usize];
-        let apart = touching(dive, leaf, near, &mut memory.touching);
-        if memory.touching.is_empty() {
-            memory.apart[dive.which][i] = Clear::new(f64::from(apart), dive.travelled);
-            continue;
-        }
-        for k in 0..memory.long.len() {
-            let edge = memory.long[k];
-            if crossings(dive, edge, &memory.touching, &mut memory.crossings) {
-                follow(dive, edge, side, memory, &mut push);
-            }
+        let spare = long_edges(dive, leaf, side, memory);
+        let apart = cross_leaves(dive, &neighbours.near[begin as usize..end as usize], memory);
+        // As the body travels, what is known of an edge's ends shrinks as well.
+        memory.apart[dive.which][i] = Clear::new(0.5 * spare.min(f64::from(apart)), dive.travelled);
+        let mut rest = memory.crossings.len();
+        while rest > 0 {
+            let edge = memory.crossings[rest - 1].0;
+            let first = memory.crossings[..rest].partition_point(|c| c.0 < edge);
+            follow(dive, edge, first..rest, side, memory, &mut push);
+            rest = first;
         }
     }
     memory.crossed.sort_unstable();
@@ -158,21 +162,84 @@ fn length(surface: &Surface, edge: u32) -> f64 {
     norm(sub(b, a))
 }
 
-/// The edges of a leaf with an end that is farther from the other surface than the tolerance. If such an edge runs through a face, that
-/// end is farther from there than the tolerance, so shorter edges can be left out.
+/// Collects the edges of a leaf with an end that is far, if they may run through a face. A known end is as far from there as it is from the
+/// surface, any other one farther than the tolerance: only what is left between is looked at. Gives how much the others lack.
 #[inline(always)]
-fn long_edges(dive: &Dive<'_>, leaf: u32, side: &Side, found: &mut Vec<u32>) {
+fn long_edges(dive: &Dive<'_>, leaf: u32, side: &Side, memory: &mut Memory) -> f64 {
     let surface = dive.own;
     let next = surface.leaves.get(leaf as usize + 1);
     let end = next.map_or(surface.edges.len() as u32, |next| next.first_edge);
-    found.clear();
-    found.extend((surface.leaves[leaf as usize].first_edge..end).filter(|&edge| {
-        let ends = surface.edges[edge as usize].vertices;
-        let [a, b] = ends.map(|v| surface.vertices[v as usize]);
+    memory.probes.clear();
+    memory.segments.clear();
+    let mut spare = f64::INFINITY;
+    for edge in surface.leaves[leaf as usize].first_edge..end {
+        let vertices = surface.edges[edge as usize].vertices;
+        let known = vertices.map(|v| side.signed_distance(v));
+        if known.iter().all(|s| s.is_finite()) {
+            spare = spare.min(dive.tolerance - known[0].max(known[1]));
+            continue;
+        }
+        let empty = known.map(|s| s.abs().min(dive.tolerance));
+        let [a, b] = vertices.map(|v| surface.vertices[v as usize]);
         let along = sub(b, a);
-        dot(along, along) > dive.tolerance * dive.tolerance
-            && ends.iter().any(|&v| side.signed_distance(v).is_infinite())
-    }));
+        let (squared, sum) = (dot(along, along), empty[0] + empty[1]);
+        if squared <= sum * sum {
+            spare = spare.min(sum - squared.sqrt());
+            continue;
+        }
+        let inverse = 1.0 / squared.sqrt();
+        let (start, along) = (dive.motion.point(a), dive.motion.direction(along));
+        let lane = memory.probes.len() % LANES;
+        if lane == 0 {
+            memory.segments.push(SegmentBlock::EMPTY);
+        }
+        if let Some(block) = memory.segments.last_mut() {
+            let ends = [empty[0] * inverse, 1.0 - empty[1] * inverse]
+                .map(|share| add(start, scale(along, share)).map(|c| c as f32));
+            block.set(lane, ends, f32::MIN_POSITIVE);
+        }
+        memory.probes.push(Probe { edge, start, along });
+    }
+    spare
+}
+
+/// Finds where the collected edges run through triangles of the near leaves, in the order of the edges. Gives how far away at least any of
+/// them is from any leaf.
+#[inline(always)]
+fn cross_leaves(dive: &Dive<'_>, near: &[u32], memory: &mut Memory) -> f32 {
+    memory.crossings.clear();
+    let mut apart = f32::INFINITY;
+    if memory.probes.is_empty() {
+        return apart;
+    }
+    for &index in near {
+        let leaf = &dive.other.leaves[index as usize];
+        for (eight, block) in memory.segments.iter().enumerate() {
+            let (_, mut mask, closest) = block.near(leaf, dive.slack);
+            apart = if closest < apart { closest } else { apart };
+            while mask != 0 {
+                let probe = &memory.probes[eight * LANES + mask.trailing_zeros() as usize];
+                mask &= mask - 1;
+                cross_leaf(dive, probe, index, &mut memory.crossings);
+            }
+        }
+    }
+    memory.crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    apart
+}
+
+#[inline(always)]
+fn cross_leaf(dive: &Dive<'_>, probe: &Probe, index: u32, found: &mut Vec<(u32, f64)>) {
+    let (leaf, block) = (&dive.other.leaves[index as usize], &dive.other.blocks[index as usize]);
+    let from = sub(probe.start, block.origin.map(f64::from));
+    let ends = [from, add(from, probe.along)].map(|p| p.map(|c| c as f32));
+    let mut mask = kernel::pierced_triangles(ends, block) & ((1 << leaf.triangles) - 1);
+    while mask != 0 {
+        let triangle = leaf.first_triangle + mask.trailing_zeros();
+        mask &= mask - 1;
+        let corners = dive.other.triangles[triangle as usize].map(|v| dive.other.vertices[v as usize]);
+        found.extend(pierces(probe.start, probe.along, corners).map(|share| (probe.edge, share)));
+    }
 }
 
 /// Looks where the ends of an edge lie that runs through faces, as far as that is not known from the number of faces.
@@ -180,28 +247,28 @@ fn long_edges(dive: &Dive<'_>, leaf: u32, side: &Side, found: &mut Vec<u32>) {
 fn follow(
     dive: &Dive<'_>,
     edge: u32,
+    crossings: Range<usize>,
     side: &mut Side,
     memory: &mut Memory,
     push: &mut impl FnMut(Inside, &Foot),
 ) {
-    let odd = memory.crossings.len() % 2 == 1;
+    let odd = crossings.len() % 2 == 1;
     if odd {
         memory.crossed.push(edge);
     }
     let length = length(dive.own, edge);
-    let mut outside = false;
-    for end in dive.own.edges[edge as usize].vertices {
-        let known = side.signed_distance(end).is_finite();
-        if !known && outside && !odd {
-            break;
-        }
-        if look(dive, end, length, side, memory, push) {
-            return;
-        }
-        outside = true;
+    let mut ends = dive.own.edges[edge as usize].vertices;
+    if side.signed_distance(ends[1]).is_finite() {
+        ends.swap(0, 1);
     }
-    if !odd {
-        between_crossings(dive, edge, memory, push);
+    // Where the number of faces is even, both ends lie on the same side.
+    if look(dive, ends[0], length, side, memory, push) {
+        return;
+    }
+    if odd {
+        look(dive, ends[1], length, side, memory, push);
+    } else if !(side.signed_distance(ends[1]) < 0.0) {
+        between_crossings(dive, edge, crossings, memory, push);
     }
 }
 
@@ -235,62 +302,23 @@ fn look(
 
 /// An edge that goes in and comes out again has its middle inside and no end that shows it.
 #[inline(always)]
-fn between_crossings(dive: &Dive<'_>, edge: u32, memory: &mut Memory, push: &mut impl FnMut(Inside, &Foot)) {
+fn between_crossings(
+    dive: &Dive<'_>,
+    edge: u32,
+    crossings: Range<usize>,
+    memory: &mut Memory,
+    push: &mut impl FnMut(Inside, &Foot),
+) {
     let [a, b] = dive.own.edges[edge as usize].vertices.map(|v| dive.own.vertices[v as usize]);
     let length = length(dive.own, edge);
-    memory.crossings.sort_unstable_by(f64::total_cmp);
-    for i in 1..memory.crossings.len() {
-        let middle = 0.5 * (memory.crossings[i - 1] + memory.crossings[i]);
-        let point = dive.motion.point(add(a, scale(sub(b, a), middle)));
-        let within = (memory.crossings[i] - memory.crossings[i - 1]) * length;
+    for pair in memory.crossings[crossings].windows(2) {
+        let (from, to) = (pair[0].1, pair[1].1);
+        let point = dive.motion.point(add(a, scale(sub(b, a), 0.5 * (from + to))));
+        let within = (to - from) * length;
         if let Some((_, foot)) = memory.nearest.foot(dive.other, point, within, dive.slack)
             && foot.signed_distance < 0.0
         {
             push(Inside::Edge(edge, point), &foot);
         }
     }
-}
-
-/// Those of the near leaves that a leaf may cross; and how far away the closest of the others is at least.
-#[inline(always)]
-fn touching(dive: &Dive<'_>, leaf: u32, near: &[u32], found: &mut Vec<u32>) -> f32 {
-    let bounds = kernel::moved_block_box(&dive.own.blocks[leaf as usize], dive.motion, dive.slack);
-    let slab = Slab::of(&dive.own.leaves[leaf as usize], dive.motion);
-    found.clear();
-    let mut closest = f32::INFINITY;
-    for &index in near {
-        let other = &dive.other.leaves[index as usize];
-        let apart = bounds
-            .apart(&other.min, &other.max)
-            .max(slab.apart(&other.min, &other.max) - dive.slack)
-            .max(Slab::of_own(other).apart(&bounds.min, &bounds.max));
-        if apart <= 0.0 {
-            found.push(index);
-        } else {
-            closest = closest.min(apart);
-        }
-    }
-    closest
-}
-
-/// Where an edge runs through faces of the near leaves; tells whether it does.
-#[inline(always)]
-fn crossings(dive: &Dive<'_>, edge: u32, near: &[u32], found: &mut Vec<f64>) -> bool {
-    found.clear();
-    let [a, b] = dive.own.edges[edge as usize].vertices.map(|v| dive.own.vertices[v as usize]);
-    let start = dive.motion.point(a);
-    let along = dive.motion.direction(sub(b, a));
-    let ends = [start, add(start, along)];
-    let bounds = Box32::around(ends[0], ends[1], dive.slack);
-    let ends = ends.map(|p| p.map(|c| c as f32));
-    for &leaf in near {
-        let leaf = &dive.other.leaves[leaf as usize];
-        if bounds.overlaps(&leaf.min, &leaf.max) && !Slab::of_own(leaf).misses_segment(ends, dive.slack) {
-            for t in leaf.first_triangle..leaf.first_triangle + u32::from(leaf.triangles) {
-                let corners = dive.other.triangles[t as usize].map(|v| dive.other.vertices[v as usize]);
-                found.extend(pierces(start, along, corners));
-            }
-        }
-    }
-    !found.is_empty()
 }

@@ -167,7 +167,7 @@ fn invert(walk: &mut Walk, leaves: usize) {
 }
 
 /// The space between two parallel planes.
-pub(super) struct Slab {
+struct Slab {
     normal: [f32; 3],
     low: f32,
     high: f32,
@@ -175,12 +175,12 @@ pub(super) struct Slab {
 
 impl Slab {
     #[inline(always)]
-    pub(super) fn of_own(leaf: &Leaf) -> Self {
+    fn of_own(leaf: &Leaf) -> Self {
         Self { normal: leaf.normal, low: leaf.low, high: leaf.high }
     }
 
     #[inline(always)]
-    pub(super) fn of(leaf: &Leaf, motion: &Rigid) -> Self {
+    fn of(leaf: &Leaf, motion: &Rigid) -> Self {
         let normal = motion.direction(leaf.normal.map(f64::from));
         let shift = crate::vector::dot(normal, motion.translation) as f32;
         Self { normal: normal.map(|c| c as f32), low: leaf.low + shift, high: leaf.high + shift }
@@ -189,26 +189,13 @@ impl Slab {
     /// True when the box is farther than `margin` from the slab.
     #[inline(always)]
     fn misses(&self, min: &[f32; 3], max: &[f32; 3], margin: f32) -> bool {
-        self.apart(min, max) > margin
-    }
-
-    /// A lower bound of the distance to a box; not positive where it reaches into the slab.
-    #[inline(always)]
-    pub(super) fn apart(&self, min: &[f32; 3], max: &[f32; 3]) -> f32 {
         let mut center = 0.0;
-        let mut half = 0.0;
+        let mut half = margin;
         for k in 0..3 {
             center += self.normal[k] * (0.5 * (min[k] + max[k]));
             half += self.normal[k].abs() * (0.5 * (max[k] - min[k]));
         }
-        (center - half - self.high).max(self.low - center - half)
-    }
-
-    /// True when a segment is farther than `margin` from the slab.
-    #[inline(always)]
-    pub(super) fn misses_segment(&self, ends: [[f32; 3]; 2], margin: f32) -> bool {
-        let [a, b] = ends.map(|p| self.normal[0] * p[0] + self.normal[1] * p[1] + self.normal[2] * p[2]);
-        a.min(b) - margin > self.high || a.max(b) + margin < self.low
+        center - half > self.high || center + half < self.low
     }
 }
 
