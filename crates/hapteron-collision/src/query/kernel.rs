@@ -1,8 +1,14 @@
-//! The inner loops, eight lanes at a time. Branch-free, so that the compiler turns them into vector instructions; every
-//! lane is the same IEEE arithmetic on any machine.
+//! The inner loops, eight lanes at a time; every lane is the same IEEE arithmetic on any machine.
 
 use crate::surface::{ERROR, LANES, Node, Surface, TriangleBlock};
 use crate::vector::Rigid;
+use wide::f32x8;
+
+/// Eight numbers to calculate with.
+#[inline(always)]
+pub(super) fn lanes(values: [f32; LANES]) -> f32x8 {
+    f32x8::new(values)
+}
 
 /// An axis-aligned box in single precision, rounded outward.
 #[derive(Clone, Copy, Debug)]
@@ -66,58 +72,44 @@ impl LeafBounds {
     /// Lower bounds of the squared distances of a point to the leaves.
     #[inline(always)]
     pub(super) fn lower(&self, p: [f32; 3], slack: f32) -> [f32; LANES] {
-        let mut squared = [0.0; LANES];
-        for l in 0..LANES {
-            let mut sum = 0.0;
-            let mut height = 0.0;
-            for k in 0..3 {
-                let (under, over) = (self.min[k][l] - p[k], p[k] - self.max[k][l]);
-                let beyond = (if under > over { under } else { over }) - slack;
-                let beyond = if beyond > 0.0 { beyond } else { 0.0 };
-                sum += beyond * beyond;
-                height += self.normal[k][l] * p[k];
-            }
-            let (under, over) = (self.low[l] - height, height - self.high[l]);
-            let beyond = (if under > over { under } else { over }) - slack;
-            let beyond = if beyond > 0.0 { beyond } else { 0.0 };
-            let slab = beyond * beyond;
-            squared[l] = if slab > sum { slab } else { sum };
+        let slack = f32x8::splat(slack);
+        let (mut sum, mut height) = (f32x8::ZERO, f32x8::ZERO);
+        for (k, &c) in p.iter().enumerate() {
+            let c = f32x8::splat(c);
+            let (under, over) = (lanes(self.min[k]) - c, c - lanes(self.max[k]));
+            let beyond = (under.fast_max(over) - slack).fast_max(f32x8::ZERO);
+            sum += beyond * beyond;
+            height += lanes(self.normal[k]) * c;
         }
-        squared
+        let (under, over) = (lanes(self.low) - height, height - lanes(self.high));
+        let beyond = (under.fast_max(over) - slack).fast_max(f32x8::ZERO);
+        (beyond * beyond).fast_max(sum).to_array()
     }
 }
 
 /// Bit `i` is set when child `i` of the node overlaps the box.
 #[inline(always)]
 pub(super) fn overlapping_children(node: &Node, b: &Box32) -> u32 {
-    let mut hit = [0u32; LANES];
-    for l in 0..LANES {
-        let apart = (node.min[0][l] > b.max[0])
-            | (node.max[0][l] < b.min[0])
-            | (node.min[1][l] > b.max[1])
-            | (node.max[1][l] < b.min[1])
-            | (node.min[2][l] > b.max[2])
-            | (node.max[2][l] < b.min[2]);
-        hit[l] = u32::from(!apart) << l;
+    let (mut low, mut high) = (f32x8::ZERO, f32x8::ZERO);
+    for k in 0..3 {
+        low |= lanes(node.min[k]).simd_gt(f32x8::splat(b.max[k]));
+        high |= lanes(node.max[k]).simd_lt(f32x8::splat(b.min[k]));
     }
-    hit.iter().fold(0, |mask, h| mask | h)
+    !(low | high).to_bitmask() & 0xff
 }
 
 /// Lower bounds of the squared distances of a point to a node's children.
 #[inline(always)]
 pub(super) fn children_squared(node: &Node, p: [f32; 3], slack: f32) -> [f32; LANES] {
-    let mut squared = [0.0; LANES];
-    for l in 0..LANES {
-        let mut sum = 0.0;
-        for k in 0..3 {
-            let (under, over) = (node.min[k][l] - p[k], p[k] - node.max[k][l]);
-            let beyond = (if under > over { under } else { over }) - slack;
-            let beyond = if beyond > 0.0 { beyond } else { 0.0 };
-            sum += beyond * beyond;
-        }
-        squared[l] = sum;
+    let slack = f32x8::splat(slack);
+    let mut sum = f32x8::ZERO;
+    for (k, &c) in p.iter().enumerate() {
+        let c = f32x8::splat(c);
+        let (under, over) = (lanes(node.min[k]) - c, c - lanes(node.max[k]));
+        let beyond = (under.fast_max(over) - slack).fast_max(f32x8::ZERO);
+        sum += beyond * beyond;
     }
-    squared
+    sum.to_array()
 }
 
 /// The boxes of a node's children after a rigid motion, each grown by `margin` on all sides.
@@ -148,21 +140,22 @@ pub(super) fn moved_block_box(block: &TriangleBlock, motion: &Rigid, margin: f32
     let mut result = Box32 { min: [0.0; 3], max: [0.0; 3] };
     for row in 0..3 {
         let r = motion.rotation[row].map(|c| c as f32);
-        let (mut low, mut high) = ([0.0f32; LANES], [0.0f32; LANES]);
-        for l in 0..LANES {
-            let turned = |v: &[[f32; LANES]; 3]| r[0] * v[0][l] + r[1] * v[1][l] + r[2] * v[2][l];
-            let (along, across) = (turned(&block.along), turned(&block.across));
-            let a = turned(&block.corner);
-            let b = a + along * block.length[0][l];
-            let (x, y) = (block.third[0][l] * block.length[2][l], block.third[1][l] * block.length[2][l]);
-            let c = a + along * x + across * y;
-            let (least, most) = if a < b { (a, b) } else { (b, a) };
-            low[l] = if c < least { c } else { least };
-            high[l] = if c > most { c } else { most };
-        }
+        let turned = |v: &[[f32; LANES]; 3]| {
+            f32x8::splat(r[0]) * lanes(v[0])
+                + f32x8::splat(r[1]) * lanes(v[1])
+                + f32x8::splat(r[2]) * lanes(v[2])
+        };
+        let (along, across) = (turned(&block.along), turned(&block.across));
+        let a = turned(&block.corner);
+        let b = a + along * lanes(block.length[0]);
+        let third = lanes(block.length[2]);
+        let (x, y) = (lanes(block.third[0]) * third, lanes(block.third[1]) * third);
+        let c = a + along * x + across * y;
+        let low = a.fast_min(b).fast_min(c).to_array();
+        let high = a.fast_max(b).fast_max(c);
         let origin = origin[row] as f32;
         result.min[row] = origin + least(&low) - margin;
-        result.max[row] = origin - least(&high.map(|h| -h)) + margin;
+        result.max[row] = origin - least(&(-high).to_array()) + margin;
     }
     result
 }
@@ -170,61 +163,52 @@ pub(super) fn moved_block_box(block: &TriangleBlock, motion: &Rigid, margin: f32
 /// Squared distances of a point (from the block's origin) to the triangles of a block.
 #[inline(always)]
 pub(super) fn point_triangles(p: [f32; 3], b: &TriangleBlock) -> [f32; LANES] {
-    let mut squared = [0.0; LANES];
-    for l in 0..LANES {
-        let q = [p[0] - b.corner[0][l], p[1] - b.corner[1][l], p[2] - b.corner[2][l]];
-        let x = b.along[0][l] * q[0] + b.along[1][l] * q[1] + b.along[2][l] * q[2];
-        let y = b.across[0][l] * q[0] + b.across[1][l] * q[1] + b.across[2][l] * q[2];
-        let z = b.normal[0][l] * q[0] + b.normal[1][l] * q[1] + b.normal[2][l] * q[2];
-        let beyond = x - b.length[0][l];
-        let (u, v) = ([b.second[0][l], b.second[1][l]], [b.third[0][l], b.third[1][l]]);
-        let (along2, across2) = (u[0] * beyond + u[1] * y, u[1] * beyond - u[0] * y);
-        let (along3, across3) = (v[0] * x + v[1] * y, v[0] * y - v[1] * x);
-        let side1 = beside(x, b.length[0][l], y);
-        let side2 = beside(along2, b.length[1][l], across2);
-        let side3 = beside(along3, b.length[2][l], across3);
-        let sides = if side1 < side2 { side1 } else { side2 };
-        let sides = if sides < side3 { sides } else { side3 };
-        let over = (y >= 0.0) & (across2 <= 0.0) & (across3 <= 0.0);
-        squared[l] = z * z + if over { 0.0 } else { sides };
-    }
-    squared
+    let q = [0, 1, 2].map(|k| f32x8::splat(p[k]) - lanes(b.corner[k]));
+    let part =
+        |axis: &[[f32; LANES]; 3]| lanes(axis[0]) * q[0] + lanes(axis[1]) * q[1] + lanes(axis[2]) * q[2];
+    let (x, y, z) = (part(&b.along), part(&b.across), part(&b.normal));
+    let length = b.length.map(lanes);
+    let beyond = x - length[0];
+    let (u, v) = (b.second.map(lanes), b.third.map(lanes));
+    let (along2, across2) = (u[0] * beyond + u[1] * y, u[1] * beyond - u[0] * y);
+    let (along3, across3) = (v[0] * x + v[1] * y, v[0] * y - v[1] * x);
+    let side1 = beside(x, length[0], y);
+    let side2 = beside(along2, length[1], across2);
+    let side3 = beside(along3, length[2], across3);
+    let sides = side1.fast_min(side2).fast_min(side3);
+    let over = y.simd_ge(f32x8::ZERO) & across2.simd_le(f32x8::ZERO) & across3.simd_le(f32x8::ZERO);
+    (z * z + over.bitselect(f32x8::ZERO, sides)).to_array()
 }
 
 /// Bit `i` is set when the segment between two points (from the block's origin) may run through triangle `i` of a block.
 #[inline(always)]
 pub(super) fn pierced_triangles([p, q]: [[f32; 3]; 2], b: &TriangleBlock) -> u32 {
     let reach: f32 = (0..3).map(|k| p[k].abs() + q[k].abs()).sum();
-    let error = b.error + ERROR * reach;
-    let mut hit = [0u32; LANES];
-    for l in 0..LANES {
-        let part = |axis: &[[f32; LANES]; 3], p: [f32; 3]| {
-            axis[0][l] * (p[0] - b.corner[0][l])
-                + axis[1][l] * (p[1] - b.corner[1][l])
-                + axis[2][l] * (p[2] - b.corner[2][l])
-        };
-        let (z, to_z) = (part(&b.normal, p), part(&b.normal, q));
-        let apart = ((z > error) & (to_z > error)) | ((z < -error) & (to_z < -error));
-        let (x, y) = (part(&b.along, p), part(&b.across, p));
-        let (dx, dy, dz) = (part(&b.along, q) - x, part(&b.across, q) - y, to_z - z);
-        // Where the segment is almost in the plane the share of it is uncertain, and infinite or not a number in it.
-        let share = -z / dz;
-        let margin = 2.0 * error + 2.0 * error / dz.abs() * (dx.abs() + dy.abs() + dz.abs());
-        let (x, y) = (x + share * dx, y + share * dy);
-        let across2 = b.second[1][l] * (x - b.length[0][l]) - b.second[0][l] * y;
-        let across3 = b.third[0][l] * y - b.third[1][l] * x;
-        let beside = (y < -margin) | (across2 > margin) | (across3 > margin);
-        hit[l] = u32::from(!(apart | beside)) << l;
-    }
-    hit.iter().fold(0, |mask, h| mask | h)
+    let error = f32x8::splat(b.error + ERROR * reach);
+    let [from, to] = [p, q].map(|p| [0, 1, 2].map(|k| f32x8::splat(p[k]) - lanes(b.corner[k])));
+    let part = |axis: &[[f32; LANES]; 3], p: &[f32x8; 3]| {
+        lanes(axis[0]) * p[0] + lanes(axis[1]) * p[1] + lanes(axis[2]) * p[2]
+    };
+    let (z, to_z) = (part(&b.normal, &from), part(&b.normal, &to));
+    let apart = z.fast_min(to_z).simd_gt(error) | z.fast_max(to_z).simd_lt(-error);
+    let (x, y) = (part(&b.along, &from), part(&b.across, &from));
+    let (dx, dy, dz) = (part(&b.along, &to) - x, part(&b.across, &to) - y, to_z - z);
+    // Where the segment is almost in the plane the share of it is uncertain, and infinite or not a number in it.
+    let share = -z / dz;
+    let doubled = error + error;
+    let margin = doubled + doubled / dz.abs() * (dx.abs() + dy.abs() + dz.abs());
+    let (x, y) = (x + share * dx, y + share * dy);
+    let (u, v) = (b.second.map(lanes), b.third.map(lanes));
+    let across2 = u[1] * (x - lanes(b.length[0])) - u[0] * y;
+    let across3 = v[0] * y - v[1] * x;
+    let beside = y.simd_lt(-margin) | across2.simd_gt(margin) | across3.simd_gt(margin);
+    !(apart | beside).to_bitmask() & 0xff
 }
 
 /// Squared distance in the plane to a side, from the coordinates along and across it.
 #[inline(always)]
-fn beside(along: f32, length: f32, across: f32) -> f32 {
-    let (under, over) = (-along, along - length);
-    let beyond = if under > over { under } else { over };
-    let beyond = if beyond > 0.0 { beyond } else { 0.0 };
+fn beside(along: f32x8, length: f32x8, across: f32x8) -> f32x8 {
+    let beyond = (-along).fast_max(along - length).fast_max(f32x8::ZERO);
     beyond * beyond + across * across
 }
 
@@ -242,21 +226,13 @@ pub(super) fn least(values: &[f32; LANES]) -> f32 {
 /// Bit `i` is set when value `i` is below `limit`.
 #[inline(always)]
 pub(super) fn below(values: &[f32; LANES], limit: f32) -> u32 {
-    let mut hit = [0u32; LANES];
-    for l in 0..LANES {
-        hit[l] = u32::from(values[l] < limit) << l;
-    }
-    hit.iter().fold(0, |mask, h| mask | h)
+    lanes(*values).simd_lt(f32x8::splat(limit)).to_bitmask()
 }
 
 /// Bit `i` is set when value `i` is at most `limit`.
 #[inline(always)]
 pub(super) fn at_most(values: &[f32; LANES], limit: f32) -> u32 {
-    let mut hit = [0u32; LANES];
-    for l in 0..LANES {
-        hit[l] = u32::from(values[l] <= limit) << l;
-    }
-    hit.iter().fold(0, |mask, h| mask | h)
+    lanes(*values).simd_le(f32x8::splat(limit)).to_bitmask()
 }
 
 #[cfg(test)]

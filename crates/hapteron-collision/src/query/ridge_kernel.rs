@@ -1,8 +1,9 @@
 //! The inner loops over edges, eight at a time; like those of the kernel, but in single precision throughout: what they
 //! let through is looked at again exactly, and what they refuse is certain.
 
-use super::kernel::least;
+use super::kernel::{lanes, least};
 use crate::surface::{Cone, LANES, Leaf};
+use wide::f32x8;
 
 /// Bound of the accumulated rounding relative to the magnitudes of the factors: some 20 operations of half a unit in the last
 /// place each, and the rounding of what they start from.
@@ -33,33 +34,27 @@ impl SegmentBlock {
     /// lower bound of the distance of any of them.
     #[inline(always)]
     pub(super) fn near(&self, leaf: &Leaf, slack: f32) -> (u32, u32, f32) {
-        let mut distance = [0.0; LANES];
-        let mut near = [0u32; LANES];
-        let mut meeting = [0u32; LANES];
-        for l in 0..LANES {
-            let mut apart = -slack;
-            let mut heights = [0.0; 2];
-            for k in 0..3 {
-                let (a, b) = (self.ends[0][k][l], self.ends[1][k][l]);
-                let (low, high) = if a < b { (a, b) } else { (b, a) };
-                let (under, over) = (leaf.min[k] - high - slack, low - leaf.max[k] - slack);
-                apart = if under > apart { under } else { apart };
-                apart = if over > apart { over } else { apart };
-                heights[0] += leaf.normal[k] * a;
-                heights[1] += leaf.normal[k] * b;
-            }
-            let (low, high) =
-                if heights[0] < heights[1] { (heights[0], heights[1]) } else { (heights[1], heights[0]) };
-            let (under, over) = (leaf.low - high - slack, low - leaf.high - slack);
-            apart = if under > apart { under } else { apart };
-            apart = if over > apart { over } else { apart };
-            distance[l] = apart;
-            meeting[l] = u32::from((apart <= 0.0) & (self.within[l] > 0.0)) << l;
-            near[l] = u32::from(apart < self.within[l]) << l;
+        let slack = f32x8::splat(slack);
+        let mut apart = -slack;
+        let mut heights = [f32x8::ZERO; 2];
+        for k in 0..3 {
+            let (a, b) = (lanes(self.ends[0][k]), lanes(self.ends[1][k]));
+            let (low, high) = (a.fast_min(b), a.fast_max(b));
+            let under = f32x8::splat(leaf.min[k]) - high - slack;
+            let over = low - f32x8::splat(leaf.max[k]) - slack;
+            apart = apart.fast_max(under).fast_max(over);
+            let normal = f32x8::splat(leaf.normal[k]);
+            heights[0] += normal * a;
+            heights[1] += normal * b;
         }
-        let near = near.iter().fold(0, |mask, h| mask | h);
-        let meeting = meeting.iter().fold(0, |mask, h| mask | h);
-        (near | meeting, meeting, least(&distance))
+        let (low, high) = (heights[0].fast_min(heights[1]), heights[0].fast_max(heights[1]));
+        let under = f32x8::splat(leaf.low) - high - slack;
+        let over = low - f32x8::splat(leaf.high) - slack;
+        let apart = apart.fast_max(under).fast_max(over);
+        let within = lanes(self.within);
+        let meeting = (apart.simd_le(f32x8::ZERO) & within.simd_gt(f32x8::ZERO)).to_bitmask();
+        let near = apart.simd_lt(within).to_bitmask();
+        (near | meeting, meeting, least(&apart.to_array()))
     }
 }
 
@@ -119,53 +114,56 @@ impl RidgeBlock {
     /// the cone's axis), shorter than `crossing`.
     #[inline(always)]
     pub(super) fn meeting(&self, p: [f32; 3], d: [f32; 3], cone: &Cone, within: f32, crossing: f32) -> u32 {
-        let n = cone.axis;
-        let (dd, size) = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2], length(d));
-        let far = length(p) + size + self.radius;
-        let mut wholes = [0.0; LANES];
-        let mut hit = [0u32; LANES];
-        for l in 0..LANES {
-            let aligned = n[0] * self.normal[0][l] + n[1] * self.normal[1][l] + n[2] * self.normal[2][l];
-            let facing = cone.faces(self.cos[l], self.sin[l], aligned);
-            let e = [self.along[0][l], self.along[1][l], self.along[2][l]];
-            let r = [p[0] - self.start[0][l], p[1] - self.start[1][l], p[2] - self.start[2][l]];
-            let w = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
-            let whole = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
-            let area = size * self.length[l];
-            // Distance times the root of `whole`, and what is positive on the inner side.
-            let h = r[0] * w[0] + r[1] * w[1] + r[2] * w[2];
-            let h_error = ERROR * area * far;
-            let inward = h * (n[0] * w[0] + n[1] * w[1] + n[2] * w[2]);
-            let limit = if within < self.within[l] { within } else { self.within[l] };
-            let passed = inward > -4.0 * h_error * area;
-            let limit = if passed & (crossing > limit) { crossing } else { limit };
-            let least = h.abs() - h_error;
-            let least = if least > 0.0 { least } else { 0.0 };
-            wholes[l] = whole + ERROR * area * area;
-            let short = least * least <= limit * limit * wholes[l] * (1.0 + 1e-5);
-            hit[l] = u32::from(facing & short & (limit > 0.0)) << l;
-        }
-        let mask = hit.iter().fold(0, |mask, h| mask | h);
+        let splat = |v: [f32; 3]| v.map(f32x8::splat);
+        let (n, size) = (splat(cone.axis), length(d));
+        let far = f32x8::splat(length(p) + size + self.radius);
+        let (p, d, size) = (splat(p), splat(d), f32x8::splat(size));
+        let (e, lengths) = (self.along.map(lanes), lanes(self.length));
+        let start = self.start.map(lanes);
+        let r = [p[0] - start[0], p[1] - start[1], p[2] - start[2]];
+        let w = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
+        let whole = dot(w, w);
+        let area = size * lengths;
+        // Distance times the root of `whole`, and what is positive on the inner side.
+        let h = dot(r, w);
+        let h_error = area * far * ERROR;
+        let inward = h * dot(n, w);
+        let (crossing, own) = (f32x8::splat(crossing), lanes(self.within));
+        let limit = f32x8::splat(within).fast_min(own);
+        let passed = inward.simd_gt(h_error * area * -4.0) & crossing.simd_gt(limit);
+        let limit = passed.bitselect(crossing, limit);
+        let least = (h.abs() - h_error).fast_max(f32x8::ZERO);
+        let whole = whole + area * area * ERROR;
+        let short = (least * least).simd_le(limit * limit * whole * (1.0 + 1e-5));
+        let mask = (self.facing(cone, n) & short & limit.simd_gt(f32x8::ZERO)).to_bitmask();
         if mask == 0 {
             return 0;
         }
-        for l in 0..LANES {
-            let e = [self.along[0][l], self.along[1][l], self.along[2][l]];
-            let r = [p[0] - self.start[0][l], p[1] - self.start[1][l], p[2] - self.start[2][l]];
-            let ee = self.length[l] * self.length[l];
-            let b = d[0] * e[0] + d[1] * e[1] + d[2] * e[2];
-            let c = d[0] * r[0] + d[1] * r[1] + d[2] * r[2];
-            let f = e[0] * r[0] + e[1] * r[1] + e[2] * r[2];
-            // Where along each edge, times `whole`.
-            let (s, t) = (b * f - c * ee, dd * f - b * c);
-            let area = ERROR * size * self.length[l] * far;
-            let (s_error, t_error) = (area * self.length[l], area * size);
-            let between =
-                (s > -s_error) & (s < wholes[l] + s_error) & (t > -t_error) & (t < wholes[l] + t_error);
-            hit[l] = u32::from(between) << l;
-        }
-        hit.iter().fold(0, |mask, h| mask | h) & mask
+        let ee = lengths * lengths;
+        let (b, c, f) = (dot(d, e), dot(d, r), dot(e, r));
+        // Where along each edge, times `whole`.
+        let (s, t) = (b * f - c * ee, dot(d, d) * f - b * c);
+        let area = size * lengths * far * ERROR;
+        let (s_error, t_error) = (area * lengths, area * size);
+        let between = s.simd_gt(-s_error)
+            & s.simd_lt(whole + s_error)
+            & t.simd_gt(-t_error)
+            & t.simd_lt(whole + t_error);
+        between.to_bitmask() & mask
     }
+
+    /// [`Cone::faces`] for eight cones; `n` is the axis of this one.
+    #[inline(always)]
+    fn facing(&self, cone: &Cone, n: [f32x8; 3]) -> f32x8 {
+        let aligned = dot(n, self.normal.map(lanes));
+        let (cos, sin) = (lanes(self.cos), lanes(self.sin));
+        (cos + cone.cos).simd_le(f32x8::ZERO) | aligned.simd_le(sin * cone.sin - cos * cone.cos + Cone::SLACK)
+    }
+}
+
+#[inline(always)]
+fn dot(a: [f32x8; 3], b: [f32x8; 3]) -> f32x8 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]
