@@ -191,6 +191,14 @@ impl Window {
 }
 
 impl eframe::App for Window {
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        // A window that nobody can see draws nothing, but its scene runs on.
+        if let Some(live) = &mut self.live {
+            live.go_on();
+            ctx.request_repaint_after(FRAME);
+        }
+    }
+
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
         self.frames.count += 1;

@@ -110,7 +110,8 @@ impl Live {
             section("Contact", true).show(ui, |ui| contact(ui, &mut self.values, widgets));
             section("Integrator and gravity", true).show(ui, |ui| physics(ui, &mut self.values, widgets));
             section("Real time", true).show(ui, |ui| self.real_time(ui));
-            section("View", false).show(ui, |ui| view(ui, shown, widgets));
+            let has_levels = self.has_levels();
+            section("View", false).show(ui, |ui| view(ui, shown, has_levels, widgets));
             ui.add_space(4.0);
             let opened = Values::of(&self.scene);
             let changed = self.values != opened;
@@ -354,7 +355,7 @@ fn physics(ui: &mut egui::Ui, values: &mut Values, widgets: &mut Widgets) {
     });
 }
 
-fn view(ui: &mut egui::Ui, shown: &mut Shown, widgets: &mut Widgets) {
+fn view(ui: &mut egui::Ui, shown: &mut Shown, has_levels: bool, widgets: &mut Widgets) {
     Grid::new("view").num_columns(2).spacing([18.0, 3.0]).show(ui, |ui| {
         let mut pairs = [
             (&mut shown.ghost, "Ghost of the device"),
@@ -374,6 +375,11 @@ fn view(ui: &mut egui::Ui, shown: &mut Shown, widgets: &mut Widgets) {
             ui.end_row();
         }
     });
+    let levels = egui::Checkbox::new(&mut shown.levels, "Contact levels in use");
+    let levels = ui.add_enabled_ui(has_levels, |ui| widgets.add(ui, "levels", levels)).inner;
+    levels
+        .on_hover_text("Where contacts are looked for: each patch of the level that is used there in a colour of its own")
+        .on_disabled_hover_text("The scene is exact. Give it contact.error_threshold = 0.02 to have levels of detail");
     ui.horizontal(|ui| {
         ui.label("Arrow of 1 N");
         ui.add(Slider::new(&mut shown.newton, 0.05..=3.0).logarithmic(true).suffix(" radii").max_decimals(2));

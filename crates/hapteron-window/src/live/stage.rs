@@ -4,8 +4,7 @@ use super::hand::Source;
 use super::steering::{Drag, Keys};
 use super::{Live, Wanted};
 use crate::theme::{Palette, screen};
-use crate::view::Colour;
-use crate::view::{Preset, Shown, Sight, View};
+use crate::view::{self, Colour, Preset, Shown, Sight, View};
 use crate::widgets::Widgets;
 use eframe::egui;
 use egui::{Align2, Color32, FontId, Key, PointerButton, Rect, Sense, pos2, vec2};
@@ -25,6 +24,7 @@ impl Live {
         let live = self.plots.cursor().is_none();
         let spots =
             if live { self.session.spots().to_vec() } else { self.past.spots(&self.scene, &row).to_vec() };
+        self.session.watch_levels(shown.levels && self.has_levels());
         let sight = Sight {
             scene: &self.scene,
             body: row.body,
@@ -33,8 +33,13 @@ impl Live {
             held: !row.flags.contains(hapteron::session::Flags::RELEASED),
             feedback: row.feedback,
             spots: &spots,
+            levels: self.session.levels().filter(|_| live),
         };
         view.paint(ui, rect, &sight, &self.shapes, shown, &self.camera);
+        if let Some(levels) = sight.levels {
+            let text = format!("Contact levels in use    {}", view::level_words(&sight, levels));
+            over(ui, rect.left_top() + vec2(14.0, 44.0), Align2::LEFT_CENTER, &text);
+        }
         self.note_places(rect, widgets, &row);
         self.badges(ui, rect, row.time);
         legend(ui, rect, shown);
@@ -121,7 +126,6 @@ impl Live {
 
     /// What is shown, and what can be done, in words over the picture.
     fn badges(&self, ui: &egui::Ui, rect: Rect, time: f64) {
-        let palette = Palette::of(ui);
         let painter = ui.painter_at(rect);
         let mut at = rect.left_top() + vec2(12.0, 10.0);
         let mut badge = |text: String, colour: Color32| {
@@ -157,10 +161,7 @@ impl Live {
         } else {
             "drag the body to move it    drag beside it: orbit    right drag: pan    wheel: zoom    F: fit"
         };
-        let place = rect.right_bottom() + vec2(-14.0, -14.0);
-        let [r, g, b, _] = palette.text;
-        let colour = screen([r, g, b, 190]);
-        painter.text(place, Align2::RIGHT_BOTTOM, hint, FontId::proportional(12.5), colour);
+        over(ui, rect.right_bottom() + vec2(-14.0, -14.0), Align2::RIGHT_BOTTOM, hint);
     }
 
     /// Keys of the page, unless something is being typed.
@@ -216,6 +217,12 @@ impl Live {
             self.steering.keys(&self.camera, &keys, radius, f64::from(dt.min(0.1)));
         }
     }
+}
+
+/// Small words over the picture.
+fn over(ui: &egui::Ui, place: egui::Pos2, align: Align2, text: &str) {
+    let [r, g, b, _] = Palette::of(ui).text;
+    ui.painter().text(place, align, text, FontId::proportional(12.5), screen([r, g, b, 200]));
 }
 
 /// What the colours in the picture are, in its upper right corner.
