@@ -149,6 +149,12 @@ impl Live {
         std::mem::take(&mut self.notices)
     }
 
+    /// Whether the hand is a device other than the window's own.
+    #[must_use]
+    pub fn has_device(&self) -> bool {
+        self.session.driver().is_some()
+    }
+
     /// Whether contacts are made at levels of detail.
     fn has_levels(&self) -> bool {
         self.scene.model.lod().is_some() && !self.scene.contact.detail.is_exact()

@@ -105,13 +105,16 @@ impl Live {
         self.status(ui, widgets);
         ui.add_space(2.0);
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            // All headings fit into a window of the usual height.
+            ui.spacing_mut().item_spacing.y = 2.5;
             section("Hand", true).show(ui, |ui| self.hand(ui, widgets));
             section("Body and coupling", true).show(ui, |ui| body(ui, &mut self.values, widgets));
             section("Contact", true).show(ui, |ui| contact(ui, &mut self.values, widgets));
             section("Integrator and gravity", true).show(ui, |ui| physics(ui, &mut self.values, widgets));
-            section("Real time", true).show(ui, |ui| self.real_time(ui));
             let has_levels = self.has_levels();
-            section("View", false).show(ui, |ui| view(ui, shown, has_levels, widgets));
+            let list = section("View", false).show(ui, |ui| view(ui, shown, has_levels, widgets));
+            widgets.note("view settings", list.header_response.rect);
+            section("Real time", true).show(ui, |ui| self.real_time(ui));
             ui.add_space(4.0);
             let opened = Values::of(&self.scene);
             let changed = self.values != opened;
@@ -219,7 +222,7 @@ impl Live {
             ("Priority", grants.priority.to_string()),
             ("Memory", grants.memory.to_string()),
         ];
-        Grid::new("real time").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
+        Grid::new("real time").num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
             for (name, value) in rows {
                 ui.label(RichText::new(name).small());
                 ui.add(egui::Label::new(RichText::new(&value).small()).truncate()).on_hover_text(value);
@@ -284,7 +287,7 @@ fn limit(
 }
 
 fn rows(ui: &mut egui::Ui, name: &str, add: impl FnOnce(&mut egui::Ui)) {
-    Grid::new(name).num_columns(2).spacing([8.0, 4.0]).show(ui, add);
+    Grid::new(name).num_columns(2).spacing([8.0, 3.0]).show(ui, add);
 }
 
 fn body(ui: &mut egui::Ui, values: &mut Values, widgets: &mut Widgets) {

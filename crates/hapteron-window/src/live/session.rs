@@ -393,7 +393,7 @@ pub(super) fn spot(plane: &ContactPlane, state: &hapteron::dynamics::State) -> S
 }
 
 /// Metres in the world for one metre of the device.
-fn scale_of(scene: &Scene) -> f64 {
+pub(super) fn scale_of(scene: &Scene) -> f64 {
     scene.file.device.position_scale.unwrap_or(1.0)
 }
 

@@ -1,6 +1,7 @@
 //! The 3D view with what the pointer and the keys do in it.
 
 use super::hand::Source;
+use super::session::scale_of;
 use super::steering::{Drag, Keys};
 use super::{Live, Wanted};
 use crate::theme::{Palette, screen};
@@ -42,7 +43,7 @@ impl Live {
         }
         self.note_places(rect, widgets, &row);
         self.badges(ui, rect, row.time);
-        legend(ui, rect, shown);
+        legend(ui, rect, shown, scale_of(&self.scene));
     }
 
     /// For scripts: where the body's grip is in the window.
@@ -225,15 +226,25 @@ fn over(ui: &egui::Ui, place: egui::Pos2, align: Align2, text: &str) {
     ui.painter().text(place, align, text, FontId::proportional(12.5), screen([r, g, b, 200]));
 }
 
+/// What of the scene's forces the hand feels: with a scaled device it is not the same.
+fn felt(what: &str, times: f64) -> String {
+    if (times - 1.0).abs() < 1e-6 {
+        return format!("{what} on the hand");
+    }
+    let number = format!("{times:.2}");
+    let number = number.trim_end_matches('0').trim_end_matches('.');
+    format!("{what} on the hand, {number} times the coupling's")
+}
+
 /// What the colours in the picture are, in its upper right corner.
-fn legend(ui: &egui::Ui, rect: Rect, shown: &Shown) {
+fn legend(ui: &egui::Ui, rect: Rect, shown: &Shown, scale: f64) {
     let palette = Palette::of(ui);
-    let entries: [(bool, Colour, &str); 5] = [
-        (shown.ghost, palette.ghost, "device (where the hand is)"),
-        (shown.coupling, palette.coupling, "coupling"),
-        (shown.forces, palette.force, "force on the hand"),
-        (shown.forces, palette.torque, "torque on the hand"),
-        (shown.contacts, palette.touching, "contacts"),
+    let entries: [(bool, Colour, String); 5] = [
+        (shown.ghost, palette.ghost, "device (where the hand is)".to_owned()),
+        (shown.coupling, palette.coupling, "coupling".to_owned()),
+        (shown.forces, palette.force, felt("force", 1.0 / scale)),
+        (shown.forces, palette.torque, felt("torque", 1.0 / (scale * scale))),
+        (shown.contacts, palette.touching, "contacts".to_owned()),
     ];
     let painter = ui.painter_at(rect);
     let mut at = rect.right_top() + vec2(-14.0, 18.0);
@@ -244,5 +255,17 @@ fn legend(ui: &egui::Ui, rect: Rect, shown: &Shown) {
         painter.text(at - vec2(14.0, 0.0), Align2::RIGHT_CENTER, name, font, screen([tr, tg, tb, 200]));
         painter.circle_filled(at - vec2(3.0, 0.0), 4.0, screen([r, g, b, 255]));
         at.y += 17.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::felt;
+
+    #[test]
+    fn a_scaled_device_is_told_of() {
+        assert_eq!(felt("force", 1.0), "force on the hand");
+        assert_eq!(felt("force", 1.0 / 0.4), "force on the hand, 2.5 times the coupling's");
+        assert_eq!(felt("torque", 6.25), "torque on the hand, 6.25 times the coupling's");
     }
 }
