@@ -39,7 +39,12 @@ impl Live {
         view.paint(ui, rect, &sight, &self.shapes, shown, &self.camera);
         if let Some(levels) = sight.levels {
             let text = format!("Contact levels in use    {}", view::level_words(&sight, levels));
-            over(ui, rect.left_top() + vec2(14.0, 44.0), Align2::LEFT_CENTER, &text);
+            badge(
+                &ui.painter_at(rect),
+                rect.left_top() + vec2(12.0, 40.0),
+                text,
+                Color32::from_rgb(58, 66, 78),
+            );
         }
         self.note_places(rect, widgets, &row);
         self.badges(ui, rect, row.time);
@@ -129,14 +134,7 @@ impl Live {
     fn badges(&self, ui: &egui::Ui, rect: Rect, time: f64) {
         let painter = ui.painter_at(rect);
         let mut at = rect.left_top() + vec2(12.0, 10.0);
-        let mut badge = |text: String, colour: Color32| {
-            let font = FontId::proportional(13.0);
-            let galley = painter.layout_no_wrap(text, font, Color32::WHITE);
-            let size = galley.size() + vec2(16.0, 7.0);
-            painter.rect_filled(Rect::from_min_size(at, size), 5.0, colour);
-            painter.galley(at + vec2(8.0, 3.5), galley, Color32::WHITE);
-            at.x += size.x + 6.0;
-        };
+        let mut badge = |text: String, colour: Color32| at.x += badge(&painter, at, text, colour) + 6.0;
         if self.plots.cursor().is_some() {
             badge(format!("HISTORY  t = {time:.3} s"), Color32::from_rgb(150, 96, 0));
         } else if let Some(end) = self.ended() {
@@ -218,6 +216,15 @@ impl Live {
             self.steering.keys(&self.camera, &keys, radius, f64::from(dt.min(0.1)));
         }
     }
+}
+
+/// Words on a ground of their own; tells how wide that is.
+fn badge(painter: &egui::Painter, at: egui::Pos2, text: String, colour: Color32) -> f32 {
+    let galley = painter.layout_no_wrap(text, FontId::proportional(13.0), Color32::WHITE);
+    let size = galley.size() + vec2(16.0, 7.0);
+    painter.rect_filled(Rect::from_min_size(at, size), 5.0, colour);
+    painter.galley(at + vec2(8.0, 3.5), galley, Color32::WHITE);
+    size.x
 }
 
 /// Small words over the picture.
