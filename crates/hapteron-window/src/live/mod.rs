@@ -4,6 +4,7 @@ mod bar;
 mod control;
 pub mod hand;
 pub mod history;
+mod kept;
 mod panel;
 mod past;
 mod recorder;
@@ -24,10 +25,10 @@ use hapteron::scene::Scene;
 use hapteron::session::real_time::End;
 use hapteron::session::{Command, CommandError, Flags};
 use history::{History, KEPT};
+pub use kept::Kept;
 use nalgebra::Isometry3;
 use past::Past;
 use recorder::{Recorded, Recorder};
-pub use session::Kept;
 use session::{Session, SessionError};
 use std::sync::Arc;
 use steering::Steering;
@@ -194,6 +195,8 @@ impl Live {
         widgets: &mut Widgets,
     ) -> Option<Wanted> {
         self.poll();
+        // As the picture begins: what ends the typing, such as Enter, may come together with the last digit.
+        let typing = ui.egui_wants_keyboard_input();
         let mut wanted = self.bar(ui, widgets);
         egui::Panel::right("parameters").default_size(312.0).size_range(280.0..=420.0).show(ui, |ui| {
             self.panel(ui, shown, widgets);
@@ -207,7 +210,7 @@ impl Live {
             },
         );
         egui::CentralPanel::no_frame().show(ui, |ui| self.stage(ui, view, shown, widgets));
-        self.keys(ui, &mut wanted);
+        self.keys(ui, typing, &mut wanted);
         self.tell();
         wanted
     }

@@ -115,14 +115,6 @@ impl Live {
             let list = section("View", false).show(ui, |ui| view(ui, shown, has_levels, widgets));
             widgets.note("view settings", list.header_response.rect);
             section("Real time", true).show(ui, |ui| self.real_time(ui));
-            ui.add_space(4.0);
-            let opened = Values::of(&self.scene);
-            let changed = self.values != opened;
-            let button = Button::new("All parameters as in the scene");
-            let reset = ui.add_enabled_ui(changed, |ui| widgets.add(ui, "reset", button)).inner;
-            if reset.clicked() {
-                self.values = opened;
-            }
             ui.add_space(8.0);
         });
     }

@@ -2,6 +2,7 @@
 
 use super::hand::{HandControl, Hold, Source, WindowHand, Wish};
 use super::history::History;
+use super::kept::Kept;
 use super::recorder::Recorder;
 use super::values::Values;
 use crate::view::Spot;
@@ -36,30 +37,6 @@ pub enum SessionError {
     /// The guard.
     #[error("{0}")]
     Guard(#[from] SceneError),
-}
-
-/// How a tick kept its time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Kept {
-    /// From its deadline to its start.
-    pub lateness_ns: u64,
-    /// Deadlines that passed by before it.
-    pub missed: u64,
-    /// How old its contacts were, ticks.
-    pub contact_age: u64,
-    /// Contacts that they were.
-    pub contacts: u32,
-}
-
-impl Kept {
-    fn of(record: &TickRecord) -> Self {
-        Self {
-            lateness_ns: record.lateness_ns,
-            missed: record.missed,
-            contact_age: record.tick.saturating_sub(record.contacts_of),
-            contacts: record.counts.0,
-        }
-    }
 }
 
 /// How the device's workspace lies in the world, as the session has put it.

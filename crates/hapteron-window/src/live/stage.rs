@@ -164,12 +164,12 @@ impl Live {
     }
 
     /// Keys of the page, unless something is being typed.
-    pub(super) fn keys(&mut self, ui: &egui::Ui, wanted: &mut Option<Wanted>) {
+    pub(super) fn keys(&mut self, ui: &egui::Ui, typing: bool, wanted: &mut Option<Wanted>) {
         // The stop works whatever has the keyboard.
         if ui.input(|i| i.key_pressed(Key::Escape)) {
             self.stop();
         }
-        if ui.egui_wants_keyboard_input() {
+        if typing || ui.egui_wants_keyboard_input() {
             return;
         }
         let pressed = |key: Key| ui.input(|i| i.key_pressed(key) && !i.modifiers.command);
