@@ -51,9 +51,15 @@ impl Live {
         legend(ui, rect, shown, scale_of(&self.scene));
     }
 
-    /// For scripts: where the body's grip is in the window.
+    /// For scripts: where the body's grip is in the window, and what cannot be seen in a picture without reading it.
     fn note_places(&self, rect: Rect, widgets: &mut Widgets, row: &hapteron::recording::Row) {
         let size = Vector2::new(f64::from(rect.width()), f64::from(rect.height()));
+        if self.steering.is_held() {
+            widgets.note("held", rect);
+        }
+        if self.replays && self.source == Source::Motion {
+            widgets.note("replaying", rect);
+        }
         let center = row.body * self.shapes.shapes[0].center;
         if let Some(place) = self.camera.project(&center, size) {
             let at = rect.min + vec2(place.x as f32, place.y as f32);
