@@ -190,8 +190,9 @@ impl Desk {
     pub fn click(&mut self, name: &str) {
         self.wait_for(name);
         self.move_to(self.place(name));
+        // Not longer: what lasts four fifths of a second is no click.
         self.xdotool(&["mousedown", "1"]);
-        self.settle();
+        self.pause(0.1);
         self.xdotool(&["mouseup", "1"]);
         self.settle();
     }
