@@ -37,7 +37,7 @@ pub enum Command {
     Compare(Compare),
     /// This machine's figures: step and query times, and how late ticks come
     #[command(
-        after_help = "Examples:\n  hapteron bench\n  hapteron bench --json --seconds 30 > bench.json\n  hapteron bench --soak 600\n"
+        after_help = "Examples:\n  hapteron bench\n  hapteron bench --json --seconds 30 > bench.json\n  hapteron bench --soak 600\n  hapteron bench --window\n  xvfb-run -s '-screen 0 1280x800x24' hapteron bench --window\n"
     )]
     Bench(Bench),
     /// Supported and attached devices, and what is missing for the others
@@ -209,12 +209,16 @@ pub struct Bench {
     /// As JSON
     #[arg(long)]
     pub json: bool,
-    /// How long each of the two loops runs
+    /// How long each of the two loops runs; with --window, how long each way of treating the window is watched
     #[arg(long, default_value_t = 10.0, value_name = "N")]
     pub seconds: f64,
     /// Instead: a session for so many seconds, and whether it leaks memory or drifts
     #[arg(long, value_name = "SECONDS")]
     pub soak: Option<f64>,
+    /// Instead: whether ticks come later while the window of `hapteron live` is open, moved, resized or frozen, and when it opens and closes;
+    /// it is opened on this display several times
+    #[arg(long, conflicts_with = "soak")]
+    pub window: bool,
 }
 
 /// `hapteron devices`

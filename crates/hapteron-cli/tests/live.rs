@@ -47,21 +47,18 @@ fn reference(name: &str) -> PathBuf {
 #[test]
 fn a_person_drags_the_jaws_together_changes_mass_and_method_records_and_replays() {
     let Some(mut desk) = Desk::open() else { return };
-    let start = desk.picture();
-    start.must_resemble(&reference("start.png"));
+    desk.must_resemble(&reference("start.png"));
 
     desk.click("jaws");
     desk.wait_for("view");
     desk.pause(1.5);
-    let open = desk.picture();
-    open.must_resemble(&reference("open.png"));
+    let open = desk.must_resemble(&reference("open.png"));
 
     // The upper jaw into the lower one, and there it is held.
     let before = desk.place("body");
-    desk.drag("body", 0, 60);
+    desk.drag_body(0, 60);
     desk.pause(1.0);
-    let closed = desk.picture();
-    closed.must_resemble(&reference("closed.png"));
+    let closed = desk.must_resemble(&reference("closed.png"));
     let view = desk.area("view");
     assert!(open.difference_within(&closed, view) > 0.004, "nothing moves in the 3D view");
     let after = desk.place("body");
@@ -81,9 +78,8 @@ fn a_person_drags_the_jaws_together_changes_mass_and_method_records_and_replays(
     desk.click("method");
     desk.wait_for("Backward Euler, Newton");
     desk.click("Backward Euler, Newton");
-    desk.pause(0.5);
     desk.click("record");
-    desk.drag("body", 0, 25);
+    desk.drag_body(0, 25);
     desk.let_go();
     desk.click("record");
     desk.wait_for_file("runs/live-jaws-2/scene.toml");
@@ -100,7 +96,7 @@ fn a_person_drags_the_jaws_together_changes_mass_and_method_records_and_replays(
 
     // The same hand again: a new session whose handle goes where the recorded one went.
     desk.click("replay");
-    desk.pause(1.0 + (recorded.rows.last().unwrap().time - recorded.rows[0].time));
+    desk.wait_for_end("replaying");
     desk.click("csv");
     desk.wait_for_file("runs/live-jaws-3/run.csv");
     let replayed = saved(&desk, "live-jaws-3");

@@ -82,6 +82,10 @@ impl Window {
 
     /// Begins to read a scene.
     pub fn open(&mut self, ctx: &egui::Context, source: Source) {
+        // A device can be held by one session only.
+        if let Some(live) = self.live.as_mut().filter(|live| live.has_device()) {
+            live.stop();
+        }
         let ctx = ctx.clone();
         match Opening::begin(source, move || ctx.request_repaint()) {
             Ok(opening) => self.opening = Some(opening),
@@ -188,10 +192,9 @@ impl Window {
             );
         }
     }
-}
 
-impl eframe::App for Window {
-    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+    /// One picture: the page that is shown, and what concerns all of them.
+    fn page(&mut self, ui: &mut egui::Ui) {
         let ctx = ui.ctx().clone();
         self.frames.count += 1;
         self.take_opened();
@@ -230,6 +233,20 @@ impl eframe::App for Window {
         let next = if self.live.is_some() { FRAME } else { Duration::from_millis(200) };
         ctx.request_repaint_after(next);
     }
+}
+
+impl eframe::App for Window {
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        // A window that nobody can see draws nothing, but its scene runs on.
+        if let Some(live) = &mut self.live {
+            live.go_on();
+            ctx.request_repaint_after(FRAME);
+        }
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        self.page(ui);
+    }
 
     fn on_exit(&mut self, gl: Option<&eframe::glow::Context>) {
         if let Some(live) = &mut self.live {
@@ -252,4 +269,101 @@ impl eframe::App for Window {
 /// Paths of the files that were dropped since the last picture.
 fn dropped(ctx: &egui::Context) -> Vec<PathBuf> {
     ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+    use std::sync::Arc;
+
+    /// A file on its way from the desktop.
+    #[derive(Debug)]
+    struct Dropped(PathBuf);
+
+    impl egui::DroppedFile for Dropped {
+        fn path(&self) -> &Path {
+            &self.0
+        }
+
+        fn bytes(&self) -> Result<Vec<u8>, String> {
+            std::fs::read(&self.0).map_err(|e| e.to_string())
+        }
+    }
+
+    /// One picture, with a file that was dropped before it.
+    fn picture(window: &mut Window, ctx: &egui::Context, file: Option<&Path>) {
+        let file = file.map(|path| Arc::new(Dropped(path.to_owned())) as egui::DroppedFileHandle);
+        let screen_rect = Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1280.0, 800.0)));
+        let input =
+            egui::RawInput { screen_rect, dropped_files: file.into_iter().collect(), ..Default::default() };
+        ctx.run_ui(input, |ui| window.page(ui)).drop_without_applying_deltas();
+    }
+
+    fn window(ctx: &egui::Context) -> Window {
+        // What is opened here is nobody's recent file.
+        Window { recent_file: None, ..Window::new(ctx, Options::default()) }
+    }
+
+    fn folder(name: &str) -> PathBuf {
+        let folder = std::env::temp_dir().join(format!("hapteron-dropped-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        folder
+    }
+
+    /// Pictures until a scene is open.
+    fn opened(window: &mut Window, ctx: &egui::Context) {
+        for _ in 0..600 {
+            picture(window, ctx, None);
+            if window.opening.is_none() {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        panic!("the scene does not open");
+    }
+
+    /// Would catch a scene file that is dropped and does not open, and a device that is named but not told to be missing.
+    #[test]
+    fn a_dropped_scene_opens_and_says_when_its_device_is_not_there() {
+        let folder = folder("scene");
+        let path = folder.join("mine.toml");
+        let text = "[scene]\nname = \"mine\"\n[body]\nmesh = \"builtin:spoon\"\n[device]\nkind = \"haply\"\n\
+                    [device.options]\naddress = \"127.0.0.1:9\"\npatience = 0.2\n";
+        std::fs::write(&path, text).unwrap();
+        let ctx = egui::Context::default();
+        let mut window = window(&ctx);
+        picture(&mut window, &ctx, Some(&path));
+        assert_eq!(window.opening.as_ref().map(|o| o.source.clone()), Some(Source::File(path.clone())));
+        opened(&mut window, &ctx);
+        let live = window.live.as_ref().expect("no scene");
+        assert!(!live.has_device());
+        let told: Vec<&str> = window.notices.iter().map(|n| n.0.text.as_str()).collect();
+        assert!(
+            told.iter().any(|t| t.contains("(haply) cannot be used") && t.contains("127.0.0.1:9")),
+            "{told:?}"
+        );
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    /// Would catch meshes that are dropped one by one and do not become one scene, and files that are neither.
+    #[test]
+    fn dropped_meshes_gather_and_other_files_are_refused_in_words() {
+        let folder = folder("meshes");
+        let ctx = egui::Context::default();
+        let mut window = window(&ctx);
+        for name in ["spoon", "cup"] {
+            let path = folder.join(format!("{name}.obj"));
+            let mesh = hapteron::assets::builtin(name).unwrap();
+            hapteron::assets::write_obj(&mesh, name, std::fs::File::create(&path).unwrap()).unwrap();
+            picture(&mut window, &ctx, Some(&path));
+        }
+        assert_eq!(window.start.parts(), 2);
+        let path = folder.join("letter.txt");
+        std::fs::write(&path, "dear all").unwrap();
+        picture(&mut window, &ctx, Some(&path));
+        opened(&mut window, &ctx);
+        assert!(window.live.is_none() && window.start.problem().is_some_and(|p| p.contains("letter.txt")));
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
 }

@@ -14,6 +14,7 @@ mod plots;
 mod recent;
 mod start;
 mod theme;
+pub mod trial;
 mod view;
 mod widgets;
 
@@ -49,8 +50,13 @@ pub struct WindowError(String);
 /// # Errors
 /// [`WindowError`] when there is no display, or none that can show OpenGL.
 pub fn open(options: Options) -> Result<(), WindowError> {
-    display::check(|name| std::env::var_os(name)).map_err(WindowError)?;
     let size = options.size.unwrap_or([1280.0, 800.0]);
+    run(size, Box::new(|creation| Ok(Box::new(app::Window::new(&creation.egui_ctx, options)))))
+}
+
+/// Shows something in a window until it is closed.
+fn run(size: [f32; 2], create: eframe::AppCreator<'_>) -> Result<(), WindowError> {
+    display::check(|name| std::env::var_os(name)).map_err(WindowError)?;
     let native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("hapteron")
@@ -62,12 +68,7 @@ pub fn open(options: Options) -> Result<(), WindowError> {
         renderer: eframe::Renderer::Glow,
         ..eframe::NativeOptions::default()
     };
-    eframe::run_native(
-        "hapteron",
-        native,
-        Box::new(|creation| Ok(Box::new(app::Window::new(&creation.egui_ctx, options)))),
-    )
-    .map_err(|error| {
+    eframe::run_native("hapteron", native, create).map_err(|error| {
         let why = match error {
             eframe::Error::WinitEventLoop(_) => "the display does not answer".to_owned(),
             eframe::Error::NoGlutinConfigs(..) => {

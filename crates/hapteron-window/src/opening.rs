@@ -4,6 +4,7 @@ use crate::live::Opened;
 use crate::live::hand::capabilities;
 use crate::view;
 use hapteron::collision::mesh;
+use hapteron::device::drivers;
 use hapteron::scene::file::{Body, Hand, Obstacle};
 use hapteron::scene::{Changes, Scene, SceneFile};
 use hapteron::scenes;
@@ -94,7 +95,9 @@ pub fn read(source: &Source) -> Result<Opened, String> {
     let guard = scene.guard_for(&capabilities()).map_err(|e| e.to_string())?;
     scene.guard = guard.map(|g| *g.settings());
     let shapes = view::shapes(&scene);
-    Ok(Opened { scene: Arc::new(scene), shapes })
+    let device =
+        scene.driver().map(|(kind, options)| drivers::open(kind, &options).map_err(|e| e.to_string()));
+    Ok(Opened { scene: Arc::new(scene), shapes, device })
 }
 
 /// A scene file; one without a motion of the hand is held where the body is.

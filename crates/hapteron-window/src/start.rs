@@ -48,6 +48,18 @@ impl StartPage {
         self.problem = Some(problem);
     }
 
+    /// Meshes that wait to become a scene.
+    #[cfg(test)]
+    pub fn parts(&self) -> usize {
+        self.assembly.as_ref().map_or(0, |a| a.parts.len())
+    }
+
+    /// What was wrong with the last one.
+    #[cfg(test)]
+    pub fn problem(&self) -> Option<&str> {
+        self.problem.as_deref()
+    }
+
     /// A mesh was dropped.
     pub fn add_mesh(&mut self, path: &std::path::Path) {
         match Part::read(path) {

@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 pub struct Widgets {
     file: Option<PathBuf>,
     places: Vec<(String, egui::Rect)>,
-    written: String,
+    pictures: u64,
 }
 
 impl Widgets {
-    /// One that writes the places into a file, when there is one, whenever they change.
+    /// One that writes the places into a file, when there is one.
     #[must_use]
     pub fn new(file: Option<&Path>) -> Self {
         Self { file: file.map(Path::to_owned), ..Self::default() }
@@ -33,26 +33,23 @@ impl Widgets {
         }
     }
 
-    /// The end of a picture: writes `name,left,top,right,bottom` in pixels, a line each, when anything has moved.
+    /// The end of a picture: writes `name,left,top,right,bottom` in pixels, a line each, and as `picture` which one it is, so that scripts
+    /// need not guess how long the window takes for what they ask.
     pub fn finish(&mut self, pixels_per_point: f32) {
         let Some(file) = &self.file else { return };
-        let mut text = String::new();
+        self.pictures += 1;
+        let mut text = format!("picture,{},0,0,0\n", self.pictures);
         for (name, rect) in self.places.drain(..) {
             let [l, t, r, b] = [rect.left(), rect.top(), rect.right(), rect.bottom()]
                 .map(|v| (v * pixels_per_point).round());
             let _ = writeln!(text, "{name},{l},{t},{r},{b}");
         }
-        if text != self.written {
-            // Through another name, so that no one reads half of it.
-            let part = file.with_extension("part");
-            let done = std::fs::write(&part, &text).and_then(|()| std::fs::rename(&part, file));
-            match done {
-                Ok(()) => self.written = text,
-                Err(error) => {
-                    eprintln!("warning: cannot write {}: {error}", file.display());
-                    self.file = None;
-                }
-            }
+        // Through another name, so that no one reads half of it.
+        let part = file.with_extension("part");
+        let done = std::fs::write(&part, &text).and_then(|()| std::fs::rename(&part, file));
+        if let Err(error) = done {
+            eprintln!("warning: cannot write {}: {error}", file.display());
+            self.file = None;
         }
     }
 }
@@ -68,7 +65,7 @@ mod tests {
         let mut widgets = Widgets::new(Some(&file));
         widgets.note("stop", egui::Rect::from_min_max(egui::pos2(1.0, 2.0), egui::pos2(11.0, 22.0)));
         widgets.finish(2.0);
-        assert_eq!(std::fs::read_to_string(&file).unwrap(), "stop,2,4,22,44\n");
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "picture,1,0,0,0\nstop,2,4,22,44\n");
         std::fs::remove_file(&file).unwrap();
     }
 }

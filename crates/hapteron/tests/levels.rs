@@ -1,11 +1,16 @@
 //! Contact levels of detail in the whole loop: a coarse replay feels like the exact one.
 #![allow(clippy::unwrap_used)]
 
+use hapteron::collision::clod::Lod;
 use hapteron::recording::Recording;
 use hapteron::scene::{Scene, SceneFile};
 use hapteron::scenes::jaws;
-use hapteron::session::run_virtual;
+use hapteron::session::real_time::{RealTime, RealTimeOptions, SceneDevice};
+use hapteron::session::{ContactPass, ContactSnapshot, LevelsInUse, VirtualTime, run_virtual};
+use nalgebra::Vector3;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
 
 fn run(mut file: SceneFile, threshold: f64) -> Recording {
     file.contact.error_threshold = Some(threshold);
@@ -72,4 +77,87 @@ fn slide() -> PathBuf {
     let path = std::env::temp_dir().join(format!("hapteron-slide-{}.csv", std::process::id()));
     std::fs::write(&path, text).unwrap();
     path
+}
+
+/// The jaws at a level, with the state in which they are closed.
+fn closed(threshold: f64) -> (Scene, hapteron::dynamics::State) {
+    let mut file = jaws();
+    file.contact.error_threshold = Some(threshold);
+    let scene = Scene::from_file(file).unwrap();
+    let mut session = VirtualTime::new(&scene).unwrap();
+    let mut last = session.advance();
+    for _ in 0..450 {
+        last = session.advance();
+    }
+    (scene, last.after.state)
+}
+
+/// Distance from a point to the nearest corner of some nodes' triangles.
+fn to_corners(lod: &Lod<'_>, nodes: &[u32], point: &Vector3<f64>) -> f64 {
+    let corners = nodes.iter().flat_map(|&node| lod.corners(node));
+    corners.map(|(corner, _)| (Vector3::from(corner) - point).norm()).fold(f64::INFINITY, f64::min)
+}
+
+/// Would catch patches shown that are not those the contacts come from: every contact is at a vertex of a patch that is shown, on the body or
+/// on the obstacle, and coarse levels have fewer patches than fine ones.
+#[test]
+fn the_levels_that_are_shown_are_those_that_contacts_are_made_at() {
+    let mut counts = Vec::new();
+    for threshold in [0.025, 0.004] {
+        let (scene, state) = closed(threshold);
+        let mut pass = ContactPass::new(&scene);
+        let mut snapshot = ContactSnapshot::empty(&scene.body, &state);
+        let mut levels = LevelsInUse::default();
+        pass.run(&scene, &state, 0.0, 0.0, &mut snapshot);
+        pass.levels_in_use(&mut levels);
+        assert_eq!(levels.fronts, [[vec![], vec![]]], "noted though nobody looks");
+        pass.watch_levels(true);
+        pass.run(&scene, &state, 0.0, 0.0, &mut snapshot);
+        pass.levels_in_use(&mut levels);
+        let [on_body, on_obstacle] = &levels.fronts[0];
+        let (body, obstacle) = (scene.model.lod().unwrap(), scene.obstacles[0].model.lod().unwrap());
+        assert!(snapshot.planes().len() > 20, "the jaws are open");
+        let mesh_from_world = scene.world_from_mesh(&state).inverse();
+        for plane in snapshot.planes() {
+            let point = state.position + state.unit_quaternion() * plane.point_b;
+            let foot = point - plane.normal_w * (plane.normal_w.dot(&point) - plane.offset);
+            let there = to_corners(&body, on_body, &(mesh_from_world * nalgebra::Point3::from(point)).coords);
+            let world_from_obstacle = scene.obstacles[0].world_from_mesh;
+            let foot = world_from_obstacle.inverse_transform_point(&foot.into()).coords;
+            let nearest = there.min(to_corners(&obstacle, on_obstacle, &foot));
+            assert!(nearest < 1e-7, "a contact {nearest} m from all patches");
+        }
+        for (lod, nodes) in [(body, on_body), (obstacle, on_obstacle)] {
+            assert!(nodes.iter().all(|&n| lod.hierarchy.level_of(n).is_some()));
+        }
+        counts.push(on_body.len() + on_obstacle.len());
+    }
+    assert!(counts[0] < counts[1], "{counts:?}");
+}
+
+/// Would catch levels that do not come out of a running session, or come although nobody looks.
+#[test]
+fn a_running_session_tells_its_levels_to_who_looks() {
+    let mut file = jaws();
+    file.contact.error_threshold = Some(0.025);
+    let scene = Arc::new(Scene::from_file(file).unwrap());
+    let device = Box::new(SceneDevice::new(Arc::clone(&scene), true).unwrap());
+    let mut running = RealTime::start(
+        Arc::clone(&scene),
+        device,
+        RealTimeOptions { attach: false, ..RealTimeOptions::of(&scene) },
+    )
+    .unwrap();
+    // Through one chewing at least.
+    std::thread::sleep(Duration::from_millis(1000));
+    assert!(running.levels().fronts.is_empty());
+    running.watch_levels(true);
+    let mut looks = 0;
+    while running.levels().fronts.iter().flatten().all(Vec::is_empty) {
+        looks += 1;
+        assert!(looks < 6000, "no levels in use");
+        std::thread::sleep(Duration::from_millis(5));
+        running.drain(&mut |_| {});
+    }
+    assert!(running.stop().end.is_regular());
 }

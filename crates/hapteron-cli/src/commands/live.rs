@@ -24,11 +24,13 @@ pub fn live(arguments: &Live) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Why there is no window in this build.
+#[cfg(not(feature = "window"))]
+pub const NO_WINDOW: &str = "this hapteron was built without its window (--no-default-features). Build it with the feature `window`; \
+                             `hapteron run` and `hapteron demo` need none";
+
 /// Runs the command.
 #[cfg(not(feature = "window"))]
 pub fn live(_: &Live) -> Result<ExitCode> {
-    anyhow::bail!(
-        "this hapteron was built without its window (--no-default-features). Build it with the feature `window`; `hapteron run` and \
-         `hapteron demo` need none"
-    )
+    anyhow::bail!("{NO_WINDOW}")
 }

@@ -75,7 +75,6 @@ impl Desk {
             .unwrap();
         let mut desk = Self { server, display, window, folder, widgets };
         desk.wait_for("jaws");
-        desk.pause(0.5);
         // Without a window manager the keys go where they are told to.
         let found = desk.xdotool(&["search", "--sync", "--onlyvisible", "--name", "hapteron"]);
         let window = found.lines().next().unwrap().to_owned();
@@ -131,6 +130,19 @@ impl Desk {
         }
     }
 
+    /// Waits until something is over that is told of like a widget.
+    pub fn wait_for_end(&self, name: &str) {
+        let begun = Instant::now();
+        while self.find(name).is_some() {
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "'{name}' does not end; see {}",
+                self.keep_picture().display()
+            );
+            std::thread::sleep(STEP);
+        }
+    }
+
     /// Waits until the window has written a file.
     pub fn wait_for_file(&self, name: &str) {
         let begun = Instant::now();
@@ -155,41 +167,56 @@ impl Desk {
         std::thread::sleep(Duration::from_secs_f64(seconds));
     }
 
+    /// Lets the window draw a few pictures, in which it takes note of what was done, however long that takes it.
+    pub fn settle(&self) {
+        let pictures = || self.find("picture").map_or(0, |p| p[0]);
+        let (begun, enough) = (Instant::now(), pictures() + 4);
+        while pictures() < enough {
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "the window draws nothing; see {}",
+                self.keep_picture().display()
+            );
+            std::thread::sleep(STEP / 10);
+        }
+    }
+
     fn move_to(&self, (x, y): (i32, i32)) {
         self.xdotool(&["mousemove", &x.to_string(), &y.to_string()]);
-        self.pause(0.25);
+        self.settle();
     }
 
     /// Clicks on a widget.
     pub fn click(&mut self, name: &str) {
         self.wait_for(name);
         self.move_to(self.place(name));
+        // Not longer: what lasts four fifths of a second is no click.
         self.xdotool(&["mousedown", "1"]);
-        self.pause(0.2);
+        self.pause(0.1);
         self.xdotool(&["mouseup", "1"]);
-        self.pause(0.4);
+        self.settle();
     }
 
-    /// Takes hold of a widget and moves it slowly; it stays held.
-    pub fn drag(&mut self, name: &str, right: i32, down: i32) {
-        self.wait_for(name);
-        let (x, y) = self.place(name);
+    /// Takes hold of the body and moves it slowly; it stays held.
+    pub fn drag_body(&mut self, right: i32, down: i32) {
+        self.wait_for("body");
+        let (x, y) = self.place("body");
         self.move_to((x, y));
         self.xdotool(&["mousedown", "1"]);
-        self.pause(0.4);
+        self.wait_for("held");
         let steps = right.abs().max(down.abs());
         for step in 1..=steps {
             let (x, y) = (x + right * step / steps, y + down * step / steps);
             self.xdotool(&["mousemove", &x.to_string(), &y.to_string()]);
             self.pause(0.03);
         }
-        self.pause(0.5);
+        self.settle();
     }
 
     /// Lets go of the mouse button.
     pub fn let_go(&self) {
         self.xdotool(&["mouseup", "1"]);
-        self.pause(0.5);
+        self.settle();
     }
 
     /// Replaces what a number or a line of text says; a slider's number is at its right end.
@@ -198,17 +225,31 @@ impl Desk {
         let [_, top, right, bottom] = self.area(name);
         self.move_to((right - 14, (top + bottom) / 2));
         self.xdotool(&["click", "1"]);
-        self.pause(0.5);
+        self.settle();
         self.xdotool(&["key", "ctrl+a"]);
+        self.settle();
         self.xdotool(&["type", "--delay", "60", text]);
+        self.settle();
         self.key("Return");
-        self.pause(0.5);
     }
 
     /// Presses a key.
     pub fn key(&self, key: &str) {
         self.xdotool(&["key", key]);
-        self.pause(0.3);
+        self.settle();
+    }
+
+    /// Waits until the display shows what a stored picture does: pictures of a busy machine come late.
+    pub fn must_resemble(&self, reference: &Path) -> Picture {
+        let begun = Instant::now();
+        loop {
+            let picture = self.picture();
+            if begun.elapsed() > PATIENCE || Picture::are_stored() || picture.resembles_file(reference) {
+                picture.must_resemble(reference);
+                return picture;
+            }
+            std::thread::sleep(2 * STEP);
+        }
     }
 
     /// What the display shows: Xvfb keeps it in a file.
@@ -225,7 +266,7 @@ impl Desk {
 
     /// Closes the window, and sees that it ends well.
     pub fn close(mut self) {
-        self.key("ctrl+q");
+        self.xdotool(&["key", "ctrl+q"]);
         let begun = Instant::now();
         let status = loop {
             if let Some(status) = self.window.try_wait().unwrap() {

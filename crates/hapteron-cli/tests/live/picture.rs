@@ -112,9 +112,19 @@ impl Picture {
         ))
     }
 
+    /// Whether pictures are to be stored instead of compared.
+    pub fn are_stored() -> bool {
+        std::env::var_os("HAPTERON_NEW_PICTURES").is_some()
+    }
+
+    /// Whether it shows what a stored picture does.
+    pub fn resembles_file(&self, reference: &Path) -> bool {
+        self.resembles(&Self::read_png(reference)).is_ok()
+    }
+
     /// Compares with a stored picture; with `HAPTERON_NEW_PICTURES=1` stores this one instead.
     pub fn must_resemble(&self, reference: &Path) {
-        if std::env::var_os("HAPTERON_NEW_PICTURES").is_some() {
+        if Self::are_stored() {
             self.small().write_png(reference);
             return;
         }

@@ -190,6 +190,12 @@ impl Hierarchy {
         self.nodes.iter().filter(|n| n.level == level && level != PURE_HULL).map(|n| self.patch(n)).collect()
     }
 
+    /// The level of a node, 0 at the finest; none for a mere hull, or where there is no such node.
+    #[must_use]
+    pub fn level_of(&self, node: u32) -> Option<u32> {
+        self.nodes.get(node as usize).map(|n| n.level).filter(|level| *level != PURE_HULL)
+    }
+
     fn patch(&self, node: &Node) -> Patch {
         Patch {
             vertices: self.hull(node).to_vec(),

@@ -1,5 +1,6 @@
 //! The row of buttons above everything.
 
+use super::values::Values;
 use super::{Live, Wanted};
 use crate::view::Preset;
 use crate::widgets::Widgets;
@@ -45,6 +46,15 @@ impl Live {
                 let hint = "Save what the plots hold as run.csv, up to the last two minutes";
                 if widgets.add(ui, "csv", Button::new("CSV")).on_hover_text(hint).clicked() {
                     self.save_csv();
+                }
+                ui.separator();
+                let opened = Values::of(&self.scene);
+                let button = Button::new("Reset values");
+                let reset =
+                    ui.add_enabled_ui(self.values != opened, |ui| widgets.add(ui, "reset", button)).inner;
+                let hint = "All parameters as in the scene";
+                if reset.on_hover_text(hint).on_disabled_hover_text("They are as in the scene").clicked() {
+                    self.values = opened;
                 }
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     crate::theme::switch(ui, widgets);

@@ -1,9 +1,12 @@
 //! A scene that runs in the window.
 
 mod bar;
+mod control;
 pub mod hand;
 pub mod history;
+mod kept;
 mod panel;
+mod past;
 mod recorder;
 mod session;
 mod stage;
@@ -12,17 +15,19 @@ mod steering;
 mod values;
 
 use crate::plots::Plots;
-use crate::view::{self, Camera, Picker, Preset, Shapes, Shown, Spot, View};
+use crate::view::{self, Camera, Picker, Preset, Shapes, Shown, View};
 use crate::widgets::Widgets;
 use eframe::egui;
 use hand::{Hold, Source};
-use hapteron::dynamics::State;
+use hapteron::device::{Device, drivers};
 use hapteron::recording::Row;
 use hapteron::scene::Scene;
 use hapteron::session::real_time::End;
-use hapteron::session::{Command, CommandError, ContactPass, ContactSnapshot, Flags};
+use hapteron::session::{Command, CommandError, Flags};
 use history::{History, KEPT};
-use nalgebra::{Isometry3, Vector3};
+pub use kept::Kept;
+use nalgebra::Isometry3;
+use past::Past;
 use recorder::{Recorded, Recorder};
 use session::{Session, SessionError};
 use std::sync::Arc;
@@ -56,6 +61,8 @@ pub struct Opened {
     pub scene: Arc<Scene>,
     /// As it is drawn.
     pub shapes: Arc<Shapes>,
+    /// The device that the scene names, or why it cannot be had; none where it names none.
+    pub device: Option<Result<Box<dyn Device>, String>>,
 }
 
 /// A running scene with all that the page shows.
@@ -92,22 +99,24 @@ pub struct Live {
     notices: Vec<Notice>,
 }
 
-/// Contacts of an instant that is over, found again.
-struct Past {
-    pass: ContactPass,
-    snapshot: ContactSnapshot,
-    time: Option<f64>,
-    spots: Vec<Spot>,
-}
-
 impl Live {
     /// Starts a scene.
     ///
     /// # Errors
     /// [`SessionError`].
     pub fn start(opened: Opened) -> Result<Self, SessionError> {
-        let Opened { scene, shapes } = opened;
-        let session = Session::start(Arc::clone(&scene), Hold::Exact, false)?;
+        let Opened { scene, shapes, device } = opened;
+        let kind = scene.driver().and_then(|(asked, _)| drivers::kinds().find(|kind| *kind == asked));
+        let mut notices = Vec::new();
+        let (session, device) = match device {
+            Some(Ok(device)) => (Session::start_device(Arc::clone(&scene), device)?, kind),
+            other => {
+                if let Some(Err(problem)) = other {
+                    notices.push(Notice { text: without_device(&scene, &problem), bad: true });
+                }
+                (Session::start(Arc::clone(&scene), Hold::Exact, false)?, None)
+            }
+        };
         let (center, radius) = view::bounds(&scene, &shapes);
         let values = Values::of(&scene);
         Ok(Self {
@@ -124,7 +133,7 @@ impl Live {
             hold: Hold::Exact,
             source: Source::Pointer,
             repeat: true,
-            device: None,
+            device,
             camera: Camera::framing(center, radius, Preset::Oblique),
             hovered: false,
             paused: false,
@@ -132,13 +141,49 @@ impl Live {
             recorded: None,
             saved: None,
             replays: false,
-            notices: Vec::new(),
+            notices,
         })
     }
 
     /// What there is to tell since the last time.
     pub fn take_notices(&mut self) -> Vec<Notice> {
         std::mem::take(&mut self.notices)
+    }
+
+    /// Whether the hand is a device other than the window's own.
+    #[must_use]
+    pub fn has_device(&self) -> bool {
+        self.session.driver().is_some()
+    }
+
+    /// Whether contacts are made at levels of detail.
+    fn has_levels(&self) -> bool {
+        self.scene.model.lod().is_some() && !self.scene.contact.detail.is_exact()
+    }
+
+    /// Takes what has happened and tells what is wanted, without a picture.
+    pub fn go_on(&mut self) {
+        self.poll();
+        self.tell();
+    }
+
+    /// The hand makes the scene's motion, over and over; from now on [`Live::take_kept`] tells of every tick.
+    pub fn play_scene(&mut self) {
+        self.source = Source::Motion;
+        self.session.restart_motion();
+        self.session.take_kept();
+        self.go_on();
+    }
+
+    /// How the ticks since the last call have kept their time.
+    pub fn take_kept(&mut self) -> Vec<Kept> {
+        self.poll();
+        self.session.take_kept()
+    }
+
+    /// Why the session ended, when it has.
+    pub fn ended(&self) -> Option<&End> {
+        self.session.ended()
     }
 
     /// One picture: takes what has happened, shows it, tells the session what is wanted.
@@ -150,6 +195,8 @@ impl Live {
         widgets: &mut Widgets,
     ) -> Option<Wanted> {
         self.poll();
+        // As the picture begins: what ends the typing, such as Enter, may come together with the last digit.
+        let typing = ui.egui_wants_keyboard_input();
         let mut wanted = self.bar(ui, widgets);
         egui::Panel::right("parameters").default_size(312.0).size_range(280.0..=420.0).show(ui, |ui| {
             self.panel(ui, shown, widgets);
@@ -163,7 +210,7 @@ impl Live {
             },
         );
         egui::CentralPanel::no_frame().show(ui, |ui| self.stage(ui, view, shown, widgets));
-        self.keys(ui, &mut wanted);
+        self.keys(ui, typing, &mut wanted);
         self.tell();
         wanted
     }
@@ -254,101 +301,6 @@ impl Live {
         self.notices.push(Notice { text, bad: true });
     }
 
-    /// Zero force, and the end of the session.
-    pub fn stop(&mut self) {
-        self.session.stop();
-        self.finish_recording();
-    }
-
-    /// The scene from its start again, with the values as they are.
-    fn start_again(&mut self) {
-        match self.values.applied_to(&self.scene) {
-            Ok(scene) => self.run(scene, false),
-            Err(problem) => self.complain(problem.to_string()),
-        }
-    }
-
-    /// The scene from its start again, with another device, or with the pointer.
-    fn switch_device(&mut self, kind: Option<&'static str>) {
-        self.device = kind;
-        self.start_again();
-    }
-
-    /// Another session in place of this one. A replay is always the window's own hand.
-    fn run(&mut self, scene: Scene, play: bool) {
-        self.session.stop();
-        let scene = Arc::new(scene);
-        let started = match self.device.filter(|_| !play) {
-            Some(kind) => Session::start_device(Arc::clone(&scene), kind),
-            None => Session::start(Arc::clone(&scene), self.hold, play),
-        };
-        match started {
-            Ok(session) => {
-                self.session = session;
-                self.told = self.values;
-                self.source = if play { Source::Motion } else { Source::Pointer };
-                self.replays = play;
-                self.steering.set(start_of_handle(&scene));
-                self.history.clear();
-                self.plots.restart();
-                self.past.time = None;
-            }
-            Err(problem) => {
-                self.device = None;
-                self.complain(format!("Cannot start: {problem}"));
-            }
-        }
-    }
-
-    /// Begins a recording, or ends and saves it.
-    fn toggle_recording(&mut self) {
-        if self.recorder.is_some() {
-            self.finish_recording();
-        } else if self.session.ended().is_none() {
-            self.recorder = Some(Recorder::new(self.told));
-        }
-    }
-
-    fn finish_recording(&mut self) {
-        let Some(recorder) = self.recorder.take() else { return };
-        let Some(recorded) = recorder.finish() else {
-            self.complain("Nothing was recorded.".to_owned());
-            return;
-        };
-        match recorded.save(&self.scene) {
-            Ok(folder) => {
-                self.say(format!("Recorded {:.1} s: {}", recorded.duration(), folder.display()));
-                self.saved = Some(folder);
-            }
-            Err(problem) => self.complain(problem),
-        }
-        self.recorded = Some(recorded);
-    }
-
-    /// The recorded hand again, with the values as they are now.
-    fn replay(&mut self) {
-        self.finish_recording();
-        let Some(recorded) = &self.recorded else { return };
-        match recorded.scene(&self.scene, &self.values) {
-            Ok(scene) => self.run(scene, true),
-            Err(problem) => self.complain(problem.to_string()),
-        }
-    }
-
-    /// Grasps, or lets go.
-    fn toggle_grasp(&mut self) {
-        let held = self.session.is_held();
-        self.send(Command::Grasp(!held));
-    }
-
-    /// Saves the rows that the plots can show.
-    fn save_csv(&mut self) {
-        match recorder::save_rows(self.history.rows(), self.scene.name()) {
-            Ok(path) => self.say(format!("Saved {}", path.display())),
-            Err(problem) => self.complain(problem),
-        }
-    }
-
     fn fit(&mut self) {
         let (center, radius) = view::bounds(&self.scene, &self.shapes);
         self.camera.fit(center, radius);
@@ -388,40 +340,19 @@ impl Live {
         });
         (!hidden).then(|| eye + ray * on_body)
     }
+}
 
-    /// Why the session ended, when it has.
-    fn ended(&self) -> Option<&End> {
-        self.session.ended()
-    }
+/// What to tell when a scene's own device is not there.
+fn without_device(scene: &Scene, problem: &str) -> String {
+    let kind = scene.driver().map_or("", |(kind, _)| kind).to_owned();
+    format!(
+        "The scene's device ({kind}) cannot be used: {problem}. Until then the pointer is the hand; when the device is there, choose it \
+         under Hand, Device."
+    )
 }
 
 /// Where a scene says that the handle is at its start.
 fn start_of_handle(scene: &Scene) -> Isometry3<f64> {
     let first = scene.trajectory.sample(0.0, scene.time_step);
     Isometry3::from_parts(first.position.into(), first.orientation)
-}
-
-impl Past {
-    fn new(scene: &Scene) -> Self {
-        Self {
-            pass: ContactPass::new(scene),
-            snapshot: ContactSnapshot::empty(&scene.body, &scene.start),
-            time: None,
-            spots: Vec::new(),
-        }
-    }
-
-    /// The contacts at a row, found once for each.
-    fn spots(&mut self, scene: &Scene, row: &Row) -> &[Spot] {
-        if self.time != Some(row.time) {
-            self.time = Some(row.time);
-            let position = row.body * nalgebra::Point3::from(scene.center_of_mass);
-            let still = Vector3::zeros();
-            let state = State::moving(&scene.body, position.coords, &row.body.rotation, &still, &still);
-            self.pass.run(scene, &state, 0.0, row.time, &mut self.snapshot);
-            self.spots.clear();
-            self.spots.extend(self.snapshot.planes().iter().map(|p| session::spot(p, &state)));
-        }
-        &self.spots
-    }
 }

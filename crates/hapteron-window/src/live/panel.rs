@@ -105,20 +105,16 @@ impl Live {
         self.status(ui, widgets);
         ui.add_space(2.0);
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            // All headings fit into a window of the usual height.
+            ui.spacing_mut().item_spacing.y = 2.5;
             section("Hand", true).show(ui, |ui| self.hand(ui, widgets));
             section("Body and coupling", true).show(ui, |ui| body(ui, &mut self.values, widgets));
             section("Contact", true).show(ui, |ui| contact(ui, &mut self.values, widgets));
             section("Integrator and gravity", true).show(ui, |ui| physics(ui, &mut self.values, widgets));
+            let has_levels = self.has_levels();
+            let list = section("View", false).show(ui, |ui| view(ui, shown, has_levels, widgets));
+            widgets.note("view settings", list.header_response.rect);
             section("Real time", true).show(ui, |ui| self.real_time(ui));
-            section("View", false).show(ui, |ui| view(ui, shown, widgets));
-            ui.add_space(4.0);
-            let opened = Values::of(&self.scene);
-            let changed = self.values != opened;
-            let button = Button::new("All parameters as in the scene");
-            let reset = ui.add_enabled_ui(changed, |ui| widgets.add(ui, "reset", button)).inner;
-            if reset.clicked() {
-                self.values = opened;
-            }
             ui.add_space(8.0);
         });
     }
@@ -218,7 +214,7 @@ impl Live {
             ("Priority", grants.priority.to_string()),
             ("Memory", grants.memory.to_string()),
         ];
-        Grid::new("real time").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
+        Grid::new("real time").num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
             for (name, value) in rows {
                 ui.label(RichText::new(name).small());
                 ui.add(egui::Label::new(RichText::new(&value).small()).truncate()).on_hover_text(value);
@@ -283,7 +279,7 @@ fn limit(
 }
 
 fn rows(ui: &mut egui::Ui, name: &str, add: impl FnOnce(&mut egui::Ui)) {
-    Grid::new(name).num_columns(2).spacing([8.0, 4.0]).show(ui, add);
+    Grid::new(name).num_columns(2).spacing([8.0, 3.0]).show(ui, add);
 }
 
 fn body(ui: &mut egui::Ui, values: &mut Values, widgets: &mut Widgets) {
@@ -354,7 +350,7 @@ fn physics(ui: &mut egui::Ui, values: &mut Values, widgets: &mut Widgets) {
     });
 }
 
-fn view(ui: &mut egui::Ui, shown: &mut Shown, widgets: &mut Widgets) {
+fn view(ui: &mut egui::Ui, shown: &mut Shown, has_levels: bool, widgets: &mut Widgets) {
     Grid::new("view").num_columns(2).spacing([18.0, 3.0]).show(ui, |ui| {
         let mut pairs = [
             (&mut shown.ghost, "Ghost of the device"),
@@ -374,6 +370,11 @@ fn view(ui: &mut egui::Ui, shown: &mut Shown, widgets: &mut Widgets) {
             ui.end_row();
         }
     });
+    let levels = egui::Checkbox::new(&mut shown.levels, "Contact levels in use");
+    let levels = ui.add_enabled_ui(has_levels, |ui| widgets.add(ui, "levels", levels)).inner;
+    levels
+        .on_hover_text("Where contacts are looked for: each patch of the level that is used there in a colour of its own")
+        .on_disabled_hover_text("The scene is exact. Give it contact.error_threshold = 0.02 to have levels of detail");
     ui.horizontal(|ui| {
         ui.label("Arrow of 1 N");
         ui.add(Slider::new(&mut shown.newton, 0.05..=3.0).logarithmic(true).suffix(" radii").max_decimals(2));

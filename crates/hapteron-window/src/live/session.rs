@@ -2,10 +2,11 @@
 
 use super::hand::{HandControl, Hold, Source, WindowHand, Wish};
 use super::history::History;
+use super::kept::Kept;
 use super::recorder::Recorder;
 use super::values::Values;
 use crate::view::Spot;
-use hapteron::device::drivers::{self, DriverOptions, OpenError};
+use hapteron::device::drivers::{self, OpenError};
 use hapteron::device::{Device, Scaling};
 use hapteron::dynamics::{ContactPlane, RigidBody};
 use hapteron::recording::Row;
@@ -13,7 +14,7 @@ use hapteron::scene::{Scene, SceneError};
 use hapteron::session::real_time::{
     End, Grants, PassRecord, RealTime, RealTimeOptions, Running, StartError, TickRecord, Timing, Told,
 };
-use hapteron::session::{Command, CommandError, Flags};
+use hapteron::session::{Command, CommandError, Flags, LevelsInUse};
 use hapteron::trajectory::{PoseRow, Trajectory, TrajectoryError};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
@@ -63,6 +64,10 @@ pub struct Session {
     /// As its mass has been set.
     body: RigidBody,
     spots: Vec<Spot>,
+    /// Contact levels in use, while somebody looks at them.
+    levels: Option<LevelsInUse>,
+    /// How ticks kept their time, while somebody counts.
+    kept: Option<Vec<Kept>>,
     /// The session has put the workspace elsewhere.
     moved: bool,
     /// Pose of the coupling frame in the body's mesh frame, as it was grasped last.
@@ -82,14 +87,13 @@ impl Session {
         Self::launch(scene, Box::new(device), control, wish, None)
     }
 
-    /// Starts a scene with a real device, or one without motors that a driver opens. Set-up: may take seconds.
+    /// Starts a scene with a real device, or one without motors that a driver has opened.
     ///
     /// # Errors
     /// [`SessionError`].
-    pub fn start_device(scene: Arc<Scene>, kind: &str) -> Result<Self, SessionError> {
-        let device = drivers::open(kind, &DriverOptions::new())?;
+    pub fn start_device(scene: Arc<Scene>, device: Box<dyn Device>) -> Result<Self, SessionError> {
         let mut scene = Scene::clone(&scene);
-        scene.guard = scene.guard_for(device.capabilities())?.map(|g| *g.settings());
+        scene.adopt(device.capabilities())?;
         let name = device.capabilities().name.clone();
         let wish = first_wish(&scene, Hold::Exact, false);
         // No one listens to the control of a hand that is not the device.
@@ -127,6 +131,8 @@ impl Session {
             latest: None,
             body,
             spots: Vec::new(),
+            levels: None,
+            kept: None,
             moved: false,
             grasp,
             held: true,
@@ -147,6 +153,7 @@ impl Session {
         let mut newest = None;
         let mut found: Vec<PassRecord> = Vec::new();
         let mut recorder = recorder;
+        let kept = &mut self.kept;
         running.drain(&mut |told| match told {
             Told::Tick(record) => {
                 if let Some(Command::SetMass(changed)) = &record.command {
@@ -163,6 +170,9 @@ impl Session {
                 *held = holds;
                 if let Some(recorder) = &mut recorder {
                     recorder.push(record, row);
+                }
+                if let Some(kept) = kept {
+                    kept.push(Kept::of(record));
                 }
                 newest = Some(*record);
             }
@@ -186,6 +196,9 @@ impl Session {
         let state = latest.result.after.state;
         self.spots.clear();
         self.spots.extend(running.contacts().planes().iter().map(|p| spot(p, &state)));
+        if let Some(levels) = &mut self.levels {
+            levels.clone_from(running.levels());
+        }
         self.timing = running.timing();
         if running.is_over() {
             self.stop();
@@ -264,6 +277,27 @@ impl Session {
         &self.spots
     }
 
+    /// Whether the contact levels in use are wanted.
+    pub fn watch_levels(&mut self, on: bool) {
+        if on != self.levels.is_some()
+            && let Some(running) = &mut self.running
+        {
+            running.watch_levels(on);
+            self.levels = on.then(LevelsInUse::default);
+        }
+    }
+
+    /// The contact levels in use, when they are wanted.
+    #[must_use]
+    pub fn levels(&self) -> Option<&LevelsInUse> {
+        self.levels.as_ref()
+    }
+
+    /// How the ticks since the last call have kept their time; from the first call on.
+    pub fn take_kept(&mut self) -> Vec<Kept> {
+        self.kept.replace(Vec::new()).unwrap_or_default()
+    }
+
     /// Whether the hand holds the body.
     #[must_use]
     pub fn is_held(&self) -> bool {
@@ -292,6 +326,15 @@ impl Session {
     pub fn grants(&self) -> &Grants {
         &self.grants
     }
+}
+
+/// Opens a device, as the scene says where it names that kind. Set-up: may take seconds.
+///
+/// # Errors
+/// [`SessionError::Driver`].
+pub(super) fn open_device(scene: &Scene, kind: &str) -> Result<Box<dyn Device>, SessionError> {
+    let own = scene.driver().filter(|(asked, _)| *asked == kind).map(|(_, options)| options);
+    Ok(drivers::open(kind, &own.unwrap_or_default())?)
 }
 
 /// The hand where the scene has it at the start.
@@ -327,7 +370,7 @@ pub(super) fn spot(plane: &ContactPlane, state: &hapteron::dynamics::State) -> S
 }
 
 /// Metres in the world for one metre of the device.
-fn scale_of(scene: &Scene) -> f64 {
+pub(super) fn scale_of(scene: &Scene) -> f64 {
     scene.file.device.position_scale.unwrap_or(1.0)
 }
 

@@ -1,11 +1,11 @@
 //! The 3D view with what the pointer and the keys do in it.
 
 use super::hand::Source;
+use super::session::scale_of;
 use super::steering::{Drag, Keys};
 use super::{Live, Wanted};
 use crate::theme::{Palette, screen};
-use crate::view::Colour;
-use crate::view::{Preset, Shown, Sight, View};
+use crate::view::{self, Colour, Preset, Shown, Sight, View};
 use crate::widgets::Widgets;
 use eframe::egui;
 use egui::{Align2, Color32, FontId, Key, PointerButton, Rect, Sense, pos2, vec2};
@@ -25,6 +25,7 @@ impl Live {
         let live = self.plots.cursor().is_none();
         let spots =
             if live { self.session.spots().to_vec() } else { self.past.spots(&self.scene, &row).to_vec() };
+        self.session.watch_levels(shown.levels && self.has_levels());
         let sight = Sight {
             scene: &self.scene,
             body: row.body,
@@ -33,16 +34,32 @@ impl Live {
             held: !row.flags.contains(hapteron::session::Flags::RELEASED),
             feedback: row.feedback,
             spots: &spots,
+            levels: self.session.levels().filter(|_| live),
         };
         view.paint(ui, rect, &sight, &self.shapes, shown, &self.camera);
+        if let Some(levels) = sight.levels {
+            let text = format!("Contact levels in use    {}", view::level_words(&sight, levels));
+            badge(
+                &ui.painter_at(rect),
+                rect.left_top() + vec2(12.0, 40.0),
+                text,
+                Color32::from_rgb(58, 66, 78),
+            );
+        }
         self.note_places(rect, widgets, &row);
         self.badges(ui, rect, row.time);
-        legend(ui, rect, shown);
+        legend(ui, rect, shown, scale_of(&self.scene));
     }
 
-    /// For scripts: where the body's grip is in the window.
+    /// For scripts: where the body's grip is in the window, and what cannot be seen in a picture without reading it.
     fn note_places(&self, rect: Rect, widgets: &mut Widgets, row: &hapteron::recording::Row) {
         let size = Vector2::new(f64::from(rect.width()), f64::from(rect.height()));
+        if self.steering.is_held() {
+            widgets.note("held", rect);
+        }
+        if self.replays && self.source == Source::Motion {
+            widgets.note("replaying", rect);
+        }
         let center = row.body * self.shapes.shapes[0].center;
         if let Some(place) = self.camera.project(&center, size) {
             let at = rect.min + vec2(place.x as f32, place.y as f32);
@@ -121,17 +138,9 @@ impl Live {
 
     /// What is shown, and what can be done, in words over the picture.
     fn badges(&self, ui: &egui::Ui, rect: Rect, time: f64) {
-        let palette = Palette::of(ui);
         let painter = ui.painter_at(rect);
         let mut at = rect.left_top() + vec2(12.0, 10.0);
-        let mut badge = |text: String, colour: Color32| {
-            let font = FontId::proportional(13.0);
-            let galley = painter.layout_no_wrap(text, font, Color32::WHITE);
-            let size = galley.size() + vec2(16.0, 7.0);
-            painter.rect_filled(Rect::from_min_size(at, size), 5.0, colour);
-            painter.galley(at + vec2(8.0, 3.5), galley, Color32::WHITE);
-            at.x += size.x + 6.0;
-        };
+        let mut badge = |text: String, colour: Color32| at.x += badge(&painter, at, text, colour) + 6.0;
         if self.plots.cursor().is_some() {
             badge(format!("HISTORY  t = {time:.3} s"), Color32::from_rgb(150, 96, 0));
         } else if let Some(end) = self.ended() {
@@ -157,19 +166,16 @@ impl Live {
         } else {
             "drag the body to move it    drag beside it: orbit    right drag: pan    wheel: zoom    F: fit"
         };
-        let place = rect.right_bottom() + vec2(-14.0, -14.0);
-        let [r, g, b, _] = palette.text;
-        let colour = screen([r, g, b, 190]);
-        painter.text(place, Align2::RIGHT_BOTTOM, hint, FontId::proportional(12.5), colour);
+        over(ui, rect.right_bottom() + vec2(-14.0, -14.0), Align2::RIGHT_BOTTOM, hint);
     }
 
     /// Keys of the page, unless something is being typed.
-    pub(super) fn keys(&mut self, ui: &egui::Ui, wanted: &mut Option<Wanted>) {
+    pub(super) fn keys(&mut self, ui: &egui::Ui, typing: bool, wanted: &mut Option<Wanted>) {
         // The stop works whatever has the keyboard.
         if ui.input(|i| i.key_pressed(Key::Escape)) {
             self.stop();
         }
-        if ui.egui_wants_keyboard_input() {
+        if typing || ui.egui_wants_keyboard_input() {
             return;
         }
         let pressed = |key: Key| ui.input(|i| i.key_pressed(key) && !i.modifiers.command);
@@ -218,15 +224,40 @@ impl Live {
     }
 }
 
+/// Words on a ground of their own; tells how wide that is.
+fn badge(painter: &egui::Painter, at: egui::Pos2, text: String, colour: Color32) -> f32 {
+    let galley = painter.layout_no_wrap(text, FontId::proportional(13.0), Color32::WHITE);
+    let size = galley.size() + vec2(16.0, 7.0);
+    painter.rect_filled(Rect::from_min_size(at, size), 5.0, colour);
+    painter.galley(at + vec2(8.0, 3.5), galley, Color32::WHITE);
+    size.x
+}
+
+/// Small words over the picture.
+fn over(ui: &egui::Ui, place: egui::Pos2, align: Align2, text: &str) {
+    let [r, g, b, _] = Palette::of(ui).text;
+    ui.painter().text(place, align, text, FontId::proportional(12.5), screen([r, g, b, 200]));
+}
+
+/// What of the scene's forces the hand feels: with a scaled device it is not the same.
+fn felt(what: &str, times: f64) -> String {
+    if (times - 1.0).abs() < 1e-6 {
+        return format!("{what} on the hand");
+    }
+    let number = format!("{times:.2}");
+    let number = number.trim_end_matches('0').trim_end_matches('.');
+    format!("{what} on the hand, {number} times the coupling's")
+}
+
 /// What the colours in the picture are, in its upper right corner.
-fn legend(ui: &egui::Ui, rect: Rect, shown: &Shown) {
+fn legend(ui: &egui::Ui, rect: Rect, shown: &Shown, scale: f64) {
     let palette = Palette::of(ui);
-    let entries: [(bool, Colour, &str); 5] = [
-        (shown.ghost, palette.ghost, "device (where the hand is)"),
-        (shown.coupling, palette.coupling, "coupling"),
-        (shown.forces, palette.force, "force on the hand"),
-        (shown.forces, palette.torque, "torque on the hand"),
-        (shown.contacts, palette.touching, "contacts"),
+    let entries: [(bool, Colour, String); 5] = [
+        (shown.ghost, palette.ghost, "device (where the hand is)".to_owned()),
+        (shown.coupling, palette.coupling, "coupling".to_owned()),
+        (shown.forces, palette.force, felt("force", 1.0 / scale)),
+        (shown.forces, palette.torque, felt("torque", 1.0 / (scale * scale))),
+        (shown.contacts, palette.touching, "contacts".to_owned()),
     ];
     let painter = ui.painter_at(rect);
     let mut at = rect.right_top() + vec2(-14.0, 18.0);
@@ -237,5 +268,17 @@ fn legend(ui: &egui::Ui, rect: Rect, shown: &Shown) {
         painter.text(at - vec2(14.0, 0.0), Align2::RIGHT_CENTER, name, font, screen([tr, tg, tb, 200]));
         painter.circle_filled(at - vec2(3.0, 0.0), 4.0, screen([r, g, b, 255]));
         at.y += 17.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::felt;
+
+    #[test]
+    fn a_scaled_device_is_told_of() {
+        assert_eq!(felt("force", 1.0), "force on the hand");
+        assert_eq!(felt("force", 1.0 / 0.4), "force on the hand, 2.5 times the coupling's");
+        assert_eq!(felt("torque", 6.25), "torque on the hand, 6.25 times the coupling's");
     }
 }

@@ -4,6 +4,7 @@ use super::Live;
 use crate::widgets::Widgets;
 use eframe::egui;
 use egui::{Button, Color32, RichText, vec2};
+use hapteron::dynamics::Status;
 use hapteron::recording::GREATEST_DEVIATION;
 use hapteron::session::{Command, Flags};
 
@@ -81,6 +82,12 @@ impl Live {
         if let Some(fault) = record.result.after.fault {
             let mut words = vec!["No force: a fault has latched".to_owned()];
             words.extend(fault.names().map(str::to_owned));
+            if fault.contains(Flags::from_status(Status::NON_FINITE)) {
+                words.push(
+                    "It was unstable: choose Backward Euler or more mass; then Esc and start again."
+                        .to_owned(),
+                );
+            }
             return (RED, words);
         }
         if let Some(fault) = record.result.after.guard.and_then(|g| g.fault()) {

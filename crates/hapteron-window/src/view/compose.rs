@@ -1,10 +1,12 @@
 //! From what happens in a scene to a [`Picture`] of it.
 
 use super::camera::Camera;
+use super::levels;
 use super::marks;
 use super::picture::{Colour, Picture, Placed, Shapes, Stroke};
 use crate::theme::Palette;
 use hapteron::scene::Scene;
+use hapteron::session::LevelsInUse;
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use std::sync::Arc;
 
@@ -30,6 +32,8 @@ pub struct Shown {
     pub axes: bool,
     /// The body is glass.
     pub see_through: bool,
+    /// The contact levels in use; the body is glass then, for contacts lie between the surfaces.
+    pub levels: bool,
     /// Length of the arrow of 1 N, as a share of the body's radius.
     pub newton: f64,
 }
@@ -46,6 +50,7 @@ impl Default for Shown {
             grid: true,
             axes: true,
             see_through: false,
+            levels: false,
             newton: 0.12,
         }
     }
@@ -79,6 +84,8 @@ pub struct Sight<'a> {
     pub feedback: [Vector3<f64>; 2],
     /// Contacts.
     pub spots: &'a [Spot],
+    /// The contact levels in use, when they are to be shown.
+    pub levels: Option<&'a LevelsInUse>,
 }
 
 /// Words at a place of the world.
@@ -117,6 +124,7 @@ pub fn picture(
         inside: palette.inside,
         shapes: Some(Arc::clone(shapes)),
         placed: Vec::new(),
+        patches: sight.levels.map(|l| levels::patches(sight, l)).unwrap_or_default(),
         solid: Vec::new(),
         sheets: Vec::new(),
         strokes: Vec::new(),
@@ -153,7 +161,7 @@ fn place(picture: &mut Picture, sight: &Sight<'_>, shown: &Shown, palette: &Pale
         });
     }
     let [r, g, b, _] = palette.body;
-    let opacity = if shown.see_through { 92 } else { 255 };
+    let opacity = if shown.see_through || sight.levels.is_some() { 92 } else { 255 };
     picture.placed.push(Placed {
         shape: 0,
         world_from_mesh: sight.body,
@@ -305,7 +313,16 @@ mod tests {
     fn sight<'a>(scene: &'a Scene, spots: &'a [Spot]) -> Sight<'a> {
         let body = scene.world_from_mesh(&scene.start);
         let grasp = view::grasp(scene);
-        Sight { scene, body, handle: body * grasp, grasp, held: true, feedback: [Vector3::zeros(); 2], spots }
+        Sight {
+            scene,
+            body,
+            handle: body * grasp,
+            grasp,
+            held: true,
+            feedback: [Vector3::zeros(); 2],
+            spots,
+            levels: None,
+        }
     }
 
     fn compose(sight: &Sight<'_>, shapes: &Arc<Shapes>) -> (Picture, Vec<Label>) {

@@ -5,12 +5,14 @@ mod compose;
 mod geometry;
 mod gl;
 mod labels;
+mod levels;
 mod marks;
 mod pick;
 mod picture;
 
 pub use camera::{Camera, Preset};
 pub use compose::{Shown, Sight, Spot};
+pub use levels::words as level_words;
 pub use pick::Picker;
 pub use picture::{Colour, Shapes};
 

@@ -1,6 +1,7 @@
 //! What one picture of the 3D view shows, without saying how it is drawn.
 
 use super::geometry::{Shape, Vertex};
+use super::levels::Patches;
 use nalgebra::{Isometry3, Matrix4, Point3, Vector3};
 use std::sync::Arc;
 
@@ -85,6 +86,8 @@ pub struct Picture {
     pub shapes: Option<Arc<Shapes>>,
     /// What is where.
     pub placed: Vec<Placed>,
+    /// The contact levels in use, over the surfaces.
+    pub patches: Vec<Patches>,
     /// Shaded triangles that are new in every picture: arrows.
     pub solid: Vec<Vertex>,
     /// Flat coloured triangles that one sees through: contact planes.

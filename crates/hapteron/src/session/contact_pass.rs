@@ -174,6 +174,13 @@ struct Workspace {
     levels: LodWorkspace,
 }
 
+/// Which nodes of the contact levels a query made its contacts with, by obstacle: those of the body, those of the obstacle. For pictures.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LevelsInUse {
+    /// Empty where a scene is exact.
+    pub fronts: Vec<[Vec<u32>; 2]>,
+}
+
 /// Runs passes; holds what one pass leaves for the next. Not for the haptic thread: it allocates as contacts grow.
 #[derive(Debug)]
 pub struct ContactPass {
@@ -289,6 +296,22 @@ impl ContactPass {
         let thinned = thin(&mut self.candidates, scene.model.surface.radius(), MAX_PLANES);
         snapshot.fill(&self.candidates, thinned, &view.body, state, view.model);
         self.contacts.iter().filter(|c| c.depth <= -d).count() as u32
+    }
+
+    /// Whether the next looks note which contact levels they use.
+    pub fn watch_levels(&mut self, on: bool) {
+        self.workspaces.iter_mut().for_each(|w| w.levels.watch(on));
+    }
+
+    /// The contact levels that the last look used; empty unless it was watched.
+    pub fn levels_in_use(&self, into: &mut LevelsInUse) {
+        into.fronts.resize(self.workspaces.len(), Default::default());
+        for (to, from) in into.fronts.iter_mut().zip(&self.workspaces) {
+            for (to, from) in to.iter_mut().zip(from.levels.front()) {
+                to.clear();
+                to.extend_from_slice(from);
+            }
+        }
     }
 
     /// The signed distance of the surfaces at a state, metres; infinite when it is more than the tolerance d.

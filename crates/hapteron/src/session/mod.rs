@@ -17,7 +17,7 @@ mod tick;
 mod virtual_time;
 
 pub use command::{Command, CommandError, ContactLaw, Gains, apply};
-pub use contact_pass::{ContactPass, ContactSnapshot, MAX_PLANES, View, handle_speed};
+pub use contact_pass::{ContactPass, ContactSnapshot, LevelsInUse, MAX_PLANES, View, handle_speed};
 pub use flags::Flags;
 pub use replay::replay;
 pub use tick::{BLEND_TIME, HapticState, Settings, Tick, tick};

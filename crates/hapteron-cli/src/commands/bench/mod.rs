@@ -1,6 +1,8 @@
 //! `hapteron bench`: this machine's figures.
 
 mod soak;
+#[cfg(feature = "window")]
+mod window;
 
 use crate::arguments::Bench;
 use crate::commands::run::checked;
@@ -27,6 +29,9 @@ const ROUNDS: usize = 31;
 pub fn bench(arguments: &Bench) -> Result<ExitCode> {
     if let Some(seconds) = checked(arguments.soak)? {
         return soak::soak(seconds, arguments.json);
+    }
+    if arguments.window {
+        return window(arguments);
     }
     let Some(seconds) = checked(Some(arguments.seconds))? else { bail!("--seconds is missing") };
     progress::catch_interrupt();
@@ -77,6 +82,18 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode> {
         us(timing.compute.quantile_ns(0.99))
     )?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Whether an open window makes ticks later.
+#[cfg(feature = "window")]
+fn window(arguments: &Bench) -> Result<ExitCode> {
+    window::window(checked(Some(arguments.seconds))?.unwrap_or_default(), arguments.json)
+}
+
+/// Whether an open window makes ticks later.
+#[cfg(not(feature = "window"))]
+fn window(_: &Bench) -> Result<ExitCode> {
+    bail!("{}", super::live::NO_WINDOW)
 }
 
 fn us(ns: u64) -> f64 {

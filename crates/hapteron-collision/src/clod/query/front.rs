@@ -72,6 +72,9 @@ pub(super) struct Front {
     stack: Vec<(u32, f32)>,
     nearest: Nearest,
     pub found: Vec<Found>,
+    /// Somebody looks at the front: its nodes are noted as well.
+    pub watched: bool,
+    pub nodes: Vec<u32>,
 }
 
 impl Front {
@@ -85,6 +88,7 @@ impl Front {
             open: vec![0.0; count],
             seen: vec![0; count],
             walk: 1,
+            watched: self.watched,
             ..Self::default()
         };
     }
@@ -154,6 +158,7 @@ impl Front {
 pub(super) fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &Judge) -> Tally {
     front.walk += 1;
     front.found.clear();
+    front.nodes.clear();
     front.stack.clear();
     front.stack.push((0, 1.0));
     let mut tally = Tally::default();
@@ -171,6 +176,9 @@ pub(super) fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>
         }
         if open == 1.0 {
             continue;
+        }
+        if front.watched {
+            front.nodes.push(index);
         }
         for sample in &hierarchy.samples[range(node.samples)] {
             let weight = sample.weight * share * (1.0 - open);

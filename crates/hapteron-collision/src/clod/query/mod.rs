@@ -13,7 +13,7 @@ mod side;
 
 pub use metric::{Combine, Detail, View};
 
-use super::Hierarchy;
+use super::{Hierarchy, range};
 use crate::contact::Contact;
 use crate::query::feature::{Feature, Foot};
 use crate::query::{QueryResult, QueryWorkspace, query};
@@ -35,6 +35,17 @@ pub struct Lod<'a> {
     pub surface: &'a Surface,
     /// Its levels.
     pub hierarchy: &'a Hierarchy,
+}
+
+impl Lod<'_> {
+    /// The original triangles that a node stands for, three corners each with their unit normals; mesh frame. For pictures.
+    pub fn corners(&self, node: u32) -> impl Iterator<Item = ([f64; 3], [f32; 3])> {
+        let triangles = self.hierarchy.nodes.get(node as usize).map_or([0; 2], |n| n.triangles);
+        let surface = self.surface;
+        let corners =
+            self.hierarchy.triangles[range(triangles)].iter().flat_map(|&t| surface.triangles[t as usize]);
+        corners.map(|v| (surface.vertices[v as usize], surface.vertex_normals[v as usize].normal))
+    }
 }
 
 /// Memory of a query at a level of detail, to be kept for the next one on the same pair. Use one for each pair.
@@ -70,6 +81,21 @@ impl LodWorkspace {
     #[must_use]
     pub fn samples(&self) -> [usize; 2] {
         self.tallies.map(|t| t.samples)
+    }
+
+    /// Whether the next queries note which nodes their fronts consist of.
+    pub fn watch(&mut self, on: bool) {
+        for front in &mut self.fronts {
+            front.watched = on;
+            front.nodes.clear();
+        }
+    }
+
+    /// Nodes of the fronts on body and obstacle in the last query, coarse ones before those that are taking their place; none unless
+    /// it was watched.
+    #[must_use]
+    pub fn front(&self) -> [&[u32]; 2] {
+        [&self.fronts[0].nodes, &self.fronts[1].nodes]
     }
 
     /// Begins anew when the surfaces are others than last time.

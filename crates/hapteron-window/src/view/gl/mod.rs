@@ -29,6 +29,7 @@ pub struct Renderer {
     meshes: Vec<Mesh>,
     cages: Vec<Strokes>,
     solid: Triangles,
+    patches: Triangles,
     sheets: Triangles,
     strokes: Strokes,
     nothing: glow::VertexArray,
@@ -70,6 +71,7 @@ impl Renderer {
             meshes: Vec::new(),
             cages: Vec::new(),
             solid: Triangles::new(gl)?,
+            patches: Triangles::new(gl)?,
             sheets: Triangles::new(gl)?,
             strokes: Strokes::new(gl, &[], true)?,
             nothing,
@@ -195,6 +197,7 @@ impl Renderer {
             cage.destroy(gl);
         }
         self.solid.destroy(gl);
+        self.patches.destroy(gl);
         self.sheets.destroy(gl);
         self.strokes.destroy(gl);
         for program in [&self.surface, &self.stroke, &self.backdrop] {
@@ -250,9 +253,26 @@ impl Renderer {
         for placed in picture.placed.iter().filter(|p| !p.cage && p.colour[3] == 255) {
             self.draw_placed(gl, placed);
         }
+        self.draw_patches(gl, picture);
         self.solid.fill(gl, &picture.solid);
         self.begin_mesh(gl, &Isometry3::identity(), [255; 4], true);
         self.solid.draw(gl);
+    }
+
+    /// The contact levels in use, a little nearer to the eye than the surfaces that they are pieces of.
+    fn draw_patches(&mut self, gl: &glow::Context, picture: &Picture) {
+        // SAFETY: plain state of the current context, put back below.
+        unsafe {
+            gl.enable(glow::POLYGON_OFFSET_FILL);
+            gl.polygon_offset(-1.0, -4.0);
+        }
+        for patches in &picture.patches {
+            self.patches.fill(gl, &patches.vertices);
+            self.begin_mesh(gl, &patches.world_from_mesh, [255; 4], true);
+            self.patches.draw(gl);
+        }
+        // SAFETY: as above.
+        unsafe { gl.disable(glow::POLYGON_OFFSET_FILL) };
     }
 
     /// What is seen through, over what is not.

@@ -96,13 +96,19 @@ impl ContactLoop {
             law: seen.law,
             model: seen.model,
         };
-        let ContactsEnd { contacts, passes, shown, .. } = &mut self.ends;
+        let levels_watched = show && self.shared.levels_watched();
+        self.pass.watch_levels(levels_watched);
+        let ContactsEnd { contacts, passes, shown, levels, .. } = &mut self.ends;
         let found: &mut Found = contacts.input_buffer_mut();
         found.of_tick = seen.of_tick;
         let in_margin = self.pass.look(&self.scene, &view, &mut found.snapshot);
         if show {
             shown.input_buffer_mut().clone_from(&found.snapshot);
             shown.publish();
+        }
+        if levels_watched {
+            self.pass.levels_in_use(levels.input_buffer_mut());
+            levels.publish();
         }
         let duration_ns = clock::now_ns().saturating_sub(begun);
         let record = PassRecord {

@@ -3,7 +3,7 @@
 
 use super::telemetry::{PassRecord, TickRecord};
 use crate::scene::ContactModel;
-use crate::session::{Command, ContactLaw, ContactSnapshot};
+use crate::session::{Command, ContactLaw, ContactSnapshot, LevelsInUse};
 use hapteron_dynamics::{Handle, RigidBody, State};
 use rtrb::{Consumer, Producer, RingBuffer};
 use triple_buffer::{Input, Output, triple_buffer};
@@ -71,6 +71,7 @@ pub(super) struct ContactsEnd {
     pub passes: Producer<PassRecord>,
     /// For those who look on.
     pub shown: Input<ContactSnapshot>,
+    pub levels: Input<LevelsInUse>,
 }
 
 /// The ends of whoever watches and steers.
@@ -80,6 +81,7 @@ pub(super) struct OuterEnd {
     pub passes: Consumer<PassRecord>,
     pub commands: Producer<Command>,
     pub shown: Output<ContactSnapshot>,
+    pub levels: Output<LevelsInUse>,
 }
 
 /// Makes all ways, with memory that has been touched. `room` is how many records may wait to be drained.
@@ -93,6 +95,7 @@ pub(super) fn exchange(
     let (states_in, states_out) = triple_buffer(seen);
     let (latest_in, latest_out) = triple_buffer(first);
     let (shown_in, shown_out) = triple_buffer(&found.snapshot);
+    let (levels_in, levels_out) = triple_buffer(&LevelsInUse::default());
     let (mut records_in, mut records_out) = RingBuffer::new(room);
     let (passes_in, passes_out) = RingBuffer::new(room);
     let (commands_in, commands_out) = RingBuffer::new(COMMANDS);
@@ -105,14 +108,20 @@ pub(super) fn exchange(
         records: records_in,
         commands: commands_out,
     };
-    let contacts =
-        ContactsEnd { states: states_out, contacts: contacts_in, passes: passes_in, shown: shown_in };
+    let contacts = ContactsEnd {
+        states: states_out,
+        contacts: contacts_in,
+        passes: passes_in,
+        shown: shown_in,
+        levels: levels_in,
+    };
     let outer = OuterEnd {
         latest: latest_out,
         records: records_out,
         passes: passes_out,
         commands: commands_in,
         shown: shown_out,
+        levels: levels_out,
     };
     (haptic, contacts, outer)
 }

@@ -6,7 +6,7 @@ use super::system::{self, Grants};
 use super::telemetry::{PassRecord, TickRecord, Timing};
 use super::{Started, clock};
 use crate::scene::Scene;
-use crate::session::{Command, CommandError, ContactSnapshot};
+use crate::session::{Command, CommandError, ContactSnapshot, LevelsInUse};
 use hapteron_device::Device;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -91,6 +91,16 @@ impl Running {
     /// Contacts as they were found a few hundredths of a second ago at most.
     pub fn contacts(&mut self) -> &ContactSnapshot {
         self.outer.shown.read()
+    }
+
+    /// Whether [`Running::levels`] are wanted. Until they are, they cost the contact thread nothing.
+    pub fn watch_levels(&mut self, on: bool) {
+        self.shared.watch_levels(on);
+    }
+
+    /// The contact levels in use a few hundredths of a second ago at most, when they are wanted.
+    pub fn levels(&mut self) -> &LevelsInUse {
+        self.outer.levels.read()
     }
 
     /// Takes the ticks and passes since the last call, in their order. To be called often enough that no more than

@@ -57,6 +57,8 @@ pub struct Shared {
     pub(super) telemetry: Telemetry,
     request: AtomicU8,
     haptic_done: AtomicBool,
+    /// Somebody looks at the contact levels.
+    levels_watched: AtomicBool,
     /// Clock of the last sign of life of the haptic thread.
     pub(super) pulse_ns: AtomicU64,
 }
@@ -91,6 +93,14 @@ impl Shared {
             FROZEN => Some(End::HapticFrozen),
             _ => Some(End::Stopped),
         }
+    }
+
+    pub(super) fn watch_levels(&self, on: bool) {
+        self.levels_watched.store(on, Ordering::Relaxed);
+    }
+
+    pub(super) fn levels_watched(&self) -> bool {
+        self.levels_watched.load(Ordering::Relaxed)
     }
 
     pub(super) fn haptic_ended(&self) {

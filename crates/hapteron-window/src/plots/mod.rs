@@ -1,14 +1,19 @@
 //! Plots of the last seconds, live or paused, with a cursor that shows an instant again.
 
+mod graph;
+mod jitter;
+
 use crate::live::history::{History, thinned};
 use crate::theme::{Palette, screen};
 use crate::view::Colour;
 use crate::widgets::Widgets;
 use eframe::egui;
 use egui::{Color32, RichText, vec2};
-use egui_plot::{Bar, BarChart, GridMark, Line, Plot, PlotBounds, VLine};
+use egui_plot::{GridMark, Line, Plot, PlotBounds, VLine};
+use graph::{Graph, Series};
 use hapteron::recording::Row;
 use hapteron::session::real_time::{Distribution, Timing};
+use jitter::jitter;
 use std::collections::VecDeque;
 
 /// Curves are thinned to so many columns: more than a plot has points across.
@@ -17,120 +22,6 @@ const COLUMNS: usize = 300;
 const RATE_STEP: f64 = 0.25;
 /// Choices of how much is shown at once, seconds.
 const WINDOWS: [f64; 5] = [1.0, 3.0, 10.0, 30.0, 120.0];
-
-/// Something that is plotted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Graph {
-    /// On the hand and by the contacts.
-    Force,
-    /// On the hand and by the contacts.
-    Torque,
-    /// Stretch of the coupling.
-    Deviation,
-    /// Greatest local depth.
-    Penetration,
-    /// Contacts and planes.
-    Contacts,
-    /// Contact passes a second.
-    Rate,
-    /// Age of the contacts in use.
-    Age,
-    /// How late ticks start.
-    Jitter,
-}
-
-/// A curve.
-struct Series {
-    name: &'static str,
-    colour: fn(&Palette) -> Colour,
-    value: fn(&Row) -> f64,
-}
-
-impl Graph {
-    /// All of them.
-    pub const ALL: [Self; 8] = [
-        Self::Force,
-        Self::Torque,
-        Self::Deviation,
-        Self::Penetration,
-        Self::Contacts,
-        Self::Rate,
-        Self::Age,
-        Self::Jitter,
-    ];
-
-    /// What people call it, and its unit.
-    fn title(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Force => ("Force", "N"),
-            Self::Torque => ("Torque", "mN m"),
-            Self::Deviation => ("Coupling deviation", "mm"),
-            Self::Penetration => ("Penetration", "mm"),
-            Self::Contacts => ("Contacts", ""),
-            Self::Rate => ("Contact rate", "Hz"),
-            Self::Age => ("Contact age", "ms"),
-            Self::Jitter => ("Tick jitter", "µs late"),
-        }
-    }
-
-    /// What a mouse that rests on its name is told.
-    fn hint(self) -> &'static str {
-        match self {
-            Self::Force => {
-                "hand: the force that the device is told. contact: the sum of the contact forces on the body."
-            }
-            Self::Torque => "hand: about the handle. contact: about the body's centre of mass.",
-            Self::Deviation => "How far the handle is from the point of the body that it holds.",
-            Self::Penetration => {
-                "The greatest local depth that the contact passes found; below zero the surfaces do not cross, down to the contact tolerance."
-            }
-            Self::Contacts => "found: contacts of the last query. planes: what they were made to.",
-            Self::Rate => "Contact passes a second.",
-            Self::Age => "How long ago the body was where the contacts in use were found.",
-            Self::Jitter => {
-                "How many ticks started how long after their deadline, since the start. Both axes logarithmic."
-            }
-        }
-    }
-
-    /// Its curves; none where it is no curve over the ticks.
-    fn series(self) -> &'static [Series] {
-        match self {
-            Self::Force => &[
-                Series { name: "contact", colour: |p| p.contact, value: |r| r.contact[0].norm() },
-                Series { name: "hand", colour: |p| p.force, value: |r| r.feedback[0].norm() },
-            ],
-            Self::Torque => &[
-                Series { name: "contact", colour: |p| p.contact, value: |r| r.contact[1].norm() * 1e3 },
-                Series { name: "hand", colour: |p| p.torque, value: |r| r.feedback[1].norm() * 1e3 },
-            ],
-            Self::Deviation => &[Series { name: "", colour: |p| p.coupling, value: |r| r.deviation * 1e3 }],
-            Self::Penetration => {
-                &[Series { name: "", colour: |p| p.touching, value: |r| r.penetration * 1e3 }]
-            }
-            Self::Contacts => &[
-                Series { name: "found", colour: |p| p.near, value: |r| f64::from(r.contacts) },
-                Series { name: "planes", colour: |p| p.plane, value: |r| f64::from(r.clusters) },
-            ],
-            Self::Age => &[Series { name: "", colour: |p| p.body, value: |r| r.contact_age * 1e3 }],
-            Self::Rate | Self::Jitter => &[],
-        }
-    }
-
-    /// The plot never shows less than this, so that noise does not fill it.
-    fn least_span(self) -> f64 {
-        match self {
-            Self::Force => 0.5,
-            Self::Torque => 5.0,
-            Self::Deviation | Self::Age => 1.0,
-            Self::Penetration => 0.2,
-            Self::Contacts => 10.0,
-            Self::Rate => 100.0,
-            Self::Jitter => 1.0,
-        }
-    }
-}
 
 /// What is shown, and which time.
 pub struct Plots {
@@ -425,61 +316,6 @@ fn reading(value: f64, graph: Graph) -> String {
     }
 }
 
-/// How many ticks were how late: decades of microseconds across, decades of counts up.
-fn jitter(ui: &mut egui::Ui, lateness: &Distribution, palette: &Palette) {
-    let colour = opaque(palette.body);
-    let bars = decades(lateness);
-    let tallest = bars.iter().map(|b| b[1]).fold(1.0, f64::max);
-    bare_plot(Graph::Jitter)
-        .x_axis_formatter(|mark: GridMark, _| time_text(mark.value))
-        .y_axis_formatter(|mark: GridMark, _| power_text(mark.value))
-        .x_grid_spacer(decade_lines)
-        .y_grid_spacer(decade_lines)
-        .show(ui, |plot| {
-            plot.set_plot_bounds(PlotBounds::from_min_max([-2.0, 0.0], [4.3, 1.08 * tallest + 0.3]));
-            let bar = |&[x, y]: &[f64; 2]| Bar::new(x, y).width(0.1).fill(colour).stroke(egui::Stroke::NONE);
-            plot.bar_chart(BarChart::new("", bars.iter().map(bar).collect()));
-        });
-}
-
-/// Grid lines at powers of ten; those of a thousand are the strong ones.
-fn decade_lines(input: egui_plot::GridInput) -> Vec<GridMark> {
-    let (low, high) = input.bounds;
-    let range = low.ceil() as i64..=high.floor() as i64;
-    let step = |n: i64| if n % 3 == 0 { 3.0 } else { 1.0 };
-    range.map(|n| GridMark { value: n as f64, step_size: step(n) }).collect()
-}
-
-/// Tenths of decades of microseconds with the logarithm of one more than their count, so that a single tick can be seen.
-fn decades(lateness: &Distribution) -> Vec<[f64; 2]> {
-    let mut counts = std::collections::BTreeMap::new();
-    for (ns, count) in lateness.bins() {
-        let decade = ((ns.max(10) as f64 * 1e-3).log10() * 10.0).floor() as i64;
-        *counts.entry(decade).or_insert(0) += count;
-    }
-    counts.into_iter().map(|(d, n)| [(d as f64 + 0.5) / 10.0, (n as f64 + 1.0).log10()]).collect()
-}
-
-/// A power of ten of ticks.
-fn power_text(power: f64) -> String {
-    match power.round() as i32 {
-        n @ 0..=2 => format!("{:.0}", 10f64.powi(n)),
-        n @ 3..=5 => format!("{:.0}k", 10f64.powi(n - 3)),
-        n @ 6.. => format!("{:.0}M", 10f64.powi(n - 6)),
-        n => format!("{}", 10f64.powi(n)),
-    }
-}
-
-/// A power of ten of microseconds.
-fn time_text(power: f64) -> String {
-    match power.round() as i32 {
-        n @ 0..=2 => format!("{:.0} µs", 10f64.powi(n)),
-        n @ 3..=5 => format!("{:.0} ms", 10f64.powi(n - 3)),
-        n @ 6.. => format!("{:.0} s", 10f64.powi(n - 6)),
-        n => format!("{:.0} ns", 10f64.powi(n + 3)),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -517,7 +353,5 @@ mod tests {
     fn numbers_are_short() {
         let texts = [0.0, 1.0, 0.25, -0.0001, 12.5].map(short);
         assert_eq!(texts, ["0", "1", "0.25", "0", "12.5"]);
-        assert_eq!([0.0, 2.0, 3.0, 4.0, 6.0].map(power_text), ["1", "100", "1k", "10k", "1M"]);
-        assert_eq!([-2.0, 0.0, 3.0, 6.0].map(time_text), ["10 ns", "1 µs", "1 ms", "1 s"]);
     }
 }
