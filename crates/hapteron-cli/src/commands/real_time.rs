@@ -199,6 +199,9 @@ pub fn print_timing(out: &mut impl Write, live: &Live) -> std::io::Result<()> {
             us(bare.greatest_ns)
         )?;
     }
+    if let Some(ratio) = timing.lateness_ratio() {
+        writeln!(out, "  99.9 % of the ticks' lateness is {ratio}")?;
+    }
     writeln!(
         out,
         "  a tick computes for {:.1} us (99 %: {:.1} us); a contact pass takes {:.0} us (99 %: {:.0} us); contacts are {:.1} ms old (99 %: {:.1} ms)",

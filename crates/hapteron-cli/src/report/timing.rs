@@ -129,8 +129,14 @@ pub fn json(live: &Live) -> Value {
         "limited_by_device": timing.limited_by_device,
         "records_lost": timing.lost,
         "within_50_us": timing.lateness.share_up_to(50_000),
+        "lateness_99_9_ratio": ratio_json(timing),
         "nanoseconds": histograms,
     })
+}
+
+/// The ticks' 99.9 % against the bare loop's: least, as measured, greatest; null without a bare loop.
+pub fn ratio_json(timing: &Timing) -> Value {
+    timing.lateness_ratio().map_or(Value::Null, |r| json!([r.between[0], r.ratio, r.between[1]]))
 }
 
 /// Quantiles and bins of a distribution.
@@ -142,6 +148,7 @@ pub fn distribution_json(d: &Distribution) -> Value {
         "p90": d.quantile_ns(0.9),
         "p99": d.quantile_ns(0.99),
         "p99_9": d.quantile_ns(0.999),
+        "p99_9_between": d.quantile_between_ns(0.999),
         "p99_99": d.quantile_ns(0.9999),
         "greatest": d.greatest_ns,
         "bins": d.bins().map(|(from, count)| json!([from, count])).collect::<Vec<_>>(),

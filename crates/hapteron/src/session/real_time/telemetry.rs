@@ -97,6 +97,40 @@ pub struct Timing {
     pub limited_by_device: u64,
 }
 
+impl Timing {
+    /// The 99.9 % of the ticks' lateness as a multiple of the bare loop's, and between which multiples it lies with at least 90 % confidence
+    /// (each of the two within its own interval of 95 %). None where no bare loop was measured.
+    #[must_use]
+    pub fn lateness_ratio(&self) -> Option<LatenessRatio> {
+        const SHARE: f64 = 0.999;
+        let (session, bare) = (&self.lateness, &self.bare_lateness);
+        // The clock tells no less than a nanosecond.
+        let ratio = |s: u64, b: u64| s.max(1) as f64 / b.max(1) as f64;
+        let ([session_low, session_high], [bare_low, bare_high]) =
+            (session.quantile_between_ns(SHARE), bare.quantile_between_ns(SHARE));
+        (session.count > 0 && bare.count > 0).then(|| LatenessRatio {
+            ratio: ratio(session.quantile_ns(SHARE), bare.quantile_ns(SHARE)),
+            between: [ratio(session_low, bare_high), ratio(session_high, bare_low)],
+        })
+    }
+}
+
+/// See [`Timing::lateness_ratio`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LatenessRatio {
+    /// Of the two 99.9 %.
+    pub ratio: f64,
+    /// Least and greatest that the numbers of durations allow.
+    pub between: [f64; 2],
+}
+
+impl std::fmt::Display for LatenessRatio {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { ratio, between: [least, greatest] } = self;
+        write!(f, "{ratio:.2} times the bare loop's (90 % sure: {least:.2} to {greatest:.2})")
+    }
+}
+
 impl Telemetry {
     /// What has been recorded so far.
     #[must_use]
