@@ -32,7 +32,7 @@ pub use running::{Finished, Running, Told};
 pub use scene_device::SceneDevice;
 pub use shared::End;
 pub use system::{Grant, Grants};
-pub use telemetry::{LatenessRatio, PassRecord, TickRecord, Timing};
+pub use telemetry::{LatenessRatio, PassRecord, TickRecord, Timing, Undelivered};
 
 use super::contact_pass::sample_speed;
 use super::{Command, ContactLaw, ContactPass, ContactSnapshot, Flags, HapticState, Settings, View, tick};
@@ -205,6 +205,7 @@ fn launch(
         let _ = outer.commands.push(Command::Attach);
     }
     let shared = Arc::new(Shared::default());
+    let capabilities = device.capabilities().clone();
     let device = Arc::new(SharedDevice::new(device));
     let contact_loop = ContactLoop {
         look: Lookahead::new(scene.contact.period + scene.contact.latency),
@@ -224,9 +225,11 @@ fn launch(
         spin: options.spin,
         duration: options.duration,
         late_limit_ns: options.late_limit.as_nanos() as u64,
+        capabilities,
         bare: options.bare,
         hook: options.tick_hook,
         ticks: 0,
+        device_off: false,
         last: sample,
         last_fresh_ns: 0,
         last_time: 0.0,
