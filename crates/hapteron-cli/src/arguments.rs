@@ -93,6 +93,18 @@ pub struct Demo {
     /// Run on the deterministic schedule, as fast as the machine can
     #[arg(long)]
     pub virtual_time: bool,
+    /// What a fault that takes the force away leads to [default: wait at a terminal, else end]
+    #[arg(long, value_name = "WHAT")]
+    pub on_fault: Option<OnFault>,
+}
+
+/// What a fault that takes the force away leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum OnFault {
+    /// The end, with exit code 1
+    End,
+    /// No force until Enter is pressed
+    Wait,
 }
 
 /// `hapteron run`
@@ -114,6 +126,9 @@ pub struct Run {
     /// Override a key of the scene, as in contact.stiffness=2000; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
+    /// What a fault that takes the force away leads to [default: wait at a terminal, else end]
+    #[arg(long, value_name = "WHAT")]
+    pub on_fault: Option<OnFault>,
     /// Folder for the results [default: runs/NAME, numbered when it exists]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

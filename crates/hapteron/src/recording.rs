@@ -184,7 +184,7 @@ pub struct Recording {
     pub rows: Vec<Row>,
     /// Greatest coupling angle, radians (not a column of `run.csv`).
     pub greatest_angle: f64,
-    /// When a fault stopped the forces, seconds.
+    /// When the fault came that keeps the forces away at the end, seconds; none when there was none, or each was re-armed.
     pub fault_time: Option<f64>,
     /// Whether the run was ended before its motion was.
     pub cancelled: bool,
@@ -229,6 +229,11 @@ impl Recording {
     /// Adds a tick.
     pub fn push(&mut self, row: Row, tick: &Tick) {
         self.greatest_angle = self.greatest_angle.max(tick.step.angle);
+        self.add(row);
+    }
+
+    fn add(&mut self, row: Row) {
+        self.fault_time = row.flags.no_force().then(|| self.fault_time.unwrap_or(row.time));
         self.rows.push(row);
     }
 
@@ -308,10 +313,7 @@ impl Recording {
                 })?;
             }
             let row = Row::from_numbers(&numbers);
-            if row.flags.no_force() && recording.fault_time.is_none() {
-                recording.fault_time = Some(row.time);
-            }
-            recording.rows.push(row);
+            recording.add(row);
         }
         if recording.rows.is_empty() {
             return Err(fail(None, "there are no rows".to_owned()));

@@ -24,5 +24,7 @@ pub fn demo(arguments: &Demo) -> Result<ExitCode> {
     if arguments.virtual_time {
         return run_into(&scene, duration, &folder);
     }
-    real_time::run_into(scene, &Plan { duration, bare: true, repeat: true, recorded_motion: false }, &folder)
+    let on_fault = arguments.on_fault;
+    let plan = Plan { duration, bare: true, repeat: true, recorded_motion: false, on_fault };
+    real_time::run_into(scene, &plan, &folder)
 }

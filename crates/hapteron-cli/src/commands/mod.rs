@@ -4,6 +4,7 @@ pub mod bench;
 pub mod compare;
 pub mod demo;
 pub mod devices;
+pub mod faults;
 pub mod levels;
 pub mod live;
 pub mod mesh;

@@ -1,6 +1,8 @@
 //! Runs in real time: the session, its live line, and the run folder.
 
+use super::faults::{Fault, Watch};
 use super::run::{begin, finish};
+use crate::arguments::OnFault;
 use crate::progress;
 use crate::report::{self, Live, Outcome, Time};
 use anyhow::{Context, Result, bail};
@@ -26,6 +28,8 @@ pub struct Plan {
     pub repeat: bool,
     /// The handle follows the scene's motion, whatever device the scene names.
     pub recorded_motion: bool,
+    /// What a fault leads to.
+    pub on_fault: Option<OnFault>,
 }
 
 /// Between two looks at the session.
@@ -57,7 +61,7 @@ pub fn run_into(mut scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode
     let options = RealTimeOptions { duration, bare: plan.bare, attach, ..RealTimeOptions::of(&scene) };
     let running = RealTime::start(Arc::clone(&scene), device, options)?;
     eprintln!("haptic thread: {}; memory {}", running.grants().priority, running.grants().memory);
-    let (finished, recorded) = follow(running, Arc::clone(&scene))?;
+    let (finished, recorded, faults) = follow(running, Arc::clone(&scene), Watch::new(plan.on_fault))?;
     let Recorded { mut recording, log, timing } = recorded;
     if recording.rows.is_empty() {
         bail!("the session ended before its first tick: {}", finished.end);
@@ -73,6 +77,7 @@ pub fn run_into(mut scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode
         timing: finished.timing,
         ticks: timing,
         device: name,
+        faults,
     };
     let path = folder.join("timing.json");
     let text = serde_json::to_string_pretty(&report::timing_json(&live))?;
@@ -82,17 +87,27 @@ pub fn run_into(mut scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode
     if !finished.end.is_regular() {
         bail!("the session ended early: {}", finished.end);
     }
+    if let Time::Real(live) = &outcome.time
+        && let Some(Fault { time, reason, rearmed: None }) = live.faults.last()
+    {
+        bail!("there was no force from {time:.3} s on: {reason}");
+    }
     Ok(code)
 }
 
 /// Watches a session to its end, with a live line.
-fn follow(mut running: Running, scene: Arc<Scene>) -> Result<(Finished, Recorded)> {
+fn follow(
+    mut running: Running,
+    scene: Arc<Scene>,
+    mut watch: Watch,
+) -> Result<(Finished, Recorded, Vec<Fault>)> {
     let mut recorder = Recorder::new(scene);
     let mut line = LiveLine::new();
     while !running.is_over() && !progress::interrupted() {
         std::thread::sleep(LOOK);
         running.drain(&mut |told| match told {
             Told::Tick(tick) => {
+                watch.tick(tick);
                 line.tick(tick);
                 recorder.tick(tick);
             }
@@ -101,11 +116,17 @@ fn follow(mut running: Running, scene: Arc<Scene>) -> Result<(Finished, Recorded
                 recorder.pass(pass);
             }
         });
+        if watch.react(&mut running) {
+            break;
+        }
         line.show(&running)?;
     }
     let finished = running.stop();
     line.end()?;
-    finished.records.iter().for_each(|r| recorder.tick(r));
+    for record in &finished.records {
+        watch.tick(record);
+        recorder.tick(record);
+    }
     finished.passes.iter().for_each(|p| recorder.pass(p));
     let bar = progress::bar(1000, "measuring depths");
     let recorded = recorder.finish(&mut |share| {
@@ -113,7 +134,7 @@ fn follow(mut running: Running, scene: Arc<Scene>) -> Result<(Finished, Recorded
         true
     });
     bar.finish_and_clear();
-    Ok((finished, recorded))
+    Ok((finished, recorded, watch.into_faults()))
 }
 
 /// What happens, every half a second, on a terminal.
@@ -199,6 +220,9 @@ pub fn print_timing(out: &mut impl Write, live: &Live) -> std::io::Result<()> {
             us(bare.greatest_ns)
         )?;
     }
+    if let Some(ratio) = timing.lateness_ratio() {
+        writeln!(out, "  99.9 % of the ticks' lateness is {ratio}")?;
+    }
     writeln!(
         out,
         "  a tick computes for {:.1} us (99 %: {:.1} us); a contact pass takes {:.0} us (99 %: {:.0} us); contacts are {:.1} ms old (99 %: {:.1} ms)",
@@ -209,5 +233,12 @@ pub fn print_timing(out: &mut impl Write, live: &Live) -> std::io::Result<()> {
         us(timing.contact_age.quantile_ns(0.5)) * 1e-3,
         us(timing.contact_age.quantile_ns(0.99)) * 1e-3
     )?;
+    if let Some(text) = report::left_out(live) {
+        writeln!(out, "  {text}")?;
+    }
+    for fault in &live.faults {
+        let since = fault.rearmed.map_or_else(|| "the end".to_owned(), |t| format!("{t:.3} s"));
+        writeln!(out, "  no force from {:.3} s to {since}: {}", fault.time, fault.reason)?;
+    }
     writeln!(out, "  haptic thread: {}; memory: {}", live.grants.priority, live.grants.memory)
 }

@@ -40,7 +40,8 @@ pub fn run(arguments: &Run) -> Result<ExitCode> {
         return run_into(&scene, duration, &folder);
     }
     let recorded_motion = arguments.replay.is_some();
-    let plan = Plan { duration, bare: false, repeat: false, recorded_motion };
+    let on_fault = arguments.on_fault;
+    let plan = Plan { duration, bare: false, repeat: false, recorded_motion, on_fault };
     real_time::run_into(scene, &plan, &folder)
 }
 
@@ -169,7 +170,7 @@ fn print_summary(out: &mut impl Write, outcome: &Outcome<'_>, summary: &Summary)
     let state = if summary.stable { "stable" } else { "NOT STABLE" };
     writeln!(out, "{}: {:.3} s in {}, {state}", scene.name(), summary.duration, time.name())?;
     if let Some(time) = recording.fault_time {
-        writeln!(out, "  a fault stopped the force at {time:.3} s")?;
+        writeln!(out, "  a fault took the force away at {time:.3} s, for good")?;
     }
     writeln!(
         out,

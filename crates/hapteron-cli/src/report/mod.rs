@@ -14,7 +14,7 @@ pub use levels::levels;
 pub use reproduction::reproduction;
 pub use run::{Live, Outcome, Time, run};
 pub use stability::stability;
-pub use timing::{distribution_json, json as timing_json};
+pub use timing::{distribution_json, json as timing_json, left_out, ratio_json};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

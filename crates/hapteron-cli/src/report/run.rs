@@ -4,6 +4,7 @@ use super::picture;
 use super::plot::{Plot, Plots};
 use super::timing;
 use super::{Cell, Page};
+use crate::commands::faults::Fault;
 use anyhow::Result;
 use hapteron::recording::{GREATEST_DEVIATION, Recording, Row};
 use hapteron::scene::{ContactModel, Scene};
@@ -25,6 +26,8 @@ pub struct Live {
     pub ticks: Vec<(u64, u64)>,
     /// Of the device.
     pub device: String,
+    /// What took the force away.
+    pub faults: Vec<Fault>,
 }
 
 /// By which clock a run went.
@@ -122,7 +125,7 @@ fn what_was_run(scene: &Scene, recording: &Recording, time: &Time) -> String {
         triangles(&scene.model.mesh),
     );
     if let Some(time) = recording.fault_time {
-        text.push_str(&format!(" A fault stopped the force at {time:.3} s."));
+        text.push_str(&format!(" A fault took the force away at {time:.3} s, for good."));
     }
     match time {
         Time::Real(live) if !live.end.is_regular() => {

@@ -52,6 +52,20 @@ pub fn section(page: &mut Page, live: &Live) {
         ));
     }
     page.paragraph(&text, false);
+    if let Some(text) = left_out(live) {
+        page.paragraph(&text, false);
+    }
+    if !live.faults.is_empty() {
+        let rows: Vec<Vec<Cell>> = live
+            .faults
+            .iter()
+            .map(|f| {
+                let until = f.rearmed.map_or_else(|| "the end".to_owned(), |t| format!("{t:.3}"));
+                [format!("{:.3}", f.time), until, f.reason.clone()].into_iter().map(Cell::Text).collect()
+            })
+            .collect();
+        page.table(&["no force from, s", "to, s", "because"], &rows);
+    }
     let mut header = vec!["microseconds"];
     header.extend(SHARES.iter().map(|s| s.0));
     header.push("greatest");
@@ -128,8 +142,34 @@ pub fn json(live: &Live) -> Value {
         "samples_used_again": timing.repeated,
         "limited_by_device": timing.limited_by_device,
         "records_lost": timing.lost,
+        "undelivered": {
+            "ticks": timing.undelivered.ticks,
+            "greatest_force": timing.undelivered.greatest_force,
+            "greatest_torque": timing.undelivered.greatest_torque,
+        },
+        "faults": live.faults.iter().map(|f| json!({"time": f.time, "rearmed": f.rearmed, "reason": f.reason})).collect::<Vec<_>>(),
         "within_50_us": timing.lateness.share_up_to(50_000),
+        "lateness_99_9_ratio": ratio_json(timing),
         "nanoseconds": histograms,
+    })
+}
+
+/// The ticks' 99.9 % against the bare loop's: least, as measured, greatest; null without a bare loop.
+pub fn ratio_json(timing: &Timing) -> Value {
+    timing.lateness_ratio().map_or(Value::Null, |r| json!([r.between[0], r.ratio, r.between[1]]))
+}
+
+/// What a device that drives some axes has no motors for; one that drives none leaves out everything, which goes without saying.
+pub fn left_out(live: &Live) -> Option<String> {
+    let undelivered = &live.timing.undelivered;
+    let driven = undelivered.greatest_force == 0.0 || undelivered.greatest_torque == 0.0;
+    (undelivered.ticks > 0 && driven).then(|| {
+        format!(
+            "the device has no motors for some of what it should have displayed: up to {:.2} N and {:.1} mN m were left out, in {} ticks",
+            undelivered.greatest_force,
+            undelivered.greatest_torque * 1e3,
+            undelivered.ticks
+        )
     })
 }
 
@@ -142,6 +182,7 @@ pub fn distribution_json(d: &Distribution) -> Value {
         "p90": d.quantile_ns(0.9),
         "p99": d.quantile_ns(0.99),
         "p99_9": d.quantile_ns(0.999),
+        "p99_9_between": d.quantile_between_ns(0.999),
         "p99_99": d.quantile_ns(0.9999),
         "greatest": d.greatest_ns,
         "bins": d.bins().map(|(from, count)| json!([from, count])).collect::<Vec<_>>(),

@@ -125,6 +125,13 @@ impl Guard {
         }
     }
 
+    /// The device's motors were off: nothing was displayed, and the force begins anew on its ramp. A fault stays.
+    pub fn interrupted(&mut self) {
+        self.gain = 0.0;
+        self.last = DeviceCommand::zero();
+        self.older = [DeviceCommand::zero(); MOST_DELAY];
+    }
+
     /// Lets a command through, as far as it may go.
     ///
     /// The command that comes out is finite, its force and torque are within the limits, and it differs from the one before by no

@@ -26,11 +26,14 @@ impl Flags {
     /// Ticks before this one were missed.
     pub const DEADLINE_MISSED: Self = Self(1 << 15);
 
+    /// The device had its motors off after the tick before; the force begins anew on the guard's ramp.
+    pub const DEVICE_OFF: Self = Self(1 << 31);
+
     /// The guard latched a fault: the command is zero until it is re-armed.
     pub const GUARD_FAULT: Self = Self::from_guard(GuardStatus::FAULT);
 
     /// What the bits mean, for people.
-    const NAMES: [(u32, &'static str); 26] = [
+    const NAMES: [(u32, &'static str); 27] = [
         (Status::NON_FINITE.bits(), "a number was not finite"),
         (Status::SINGULAR.bits(), "the system of equations was singular"),
         (Status::COUPLING_ANGLE_LIMIT.bits(), "coupling near half a turn"),
@@ -44,6 +47,7 @@ impl Flags {
         (1 << 13, "paused"),
         (1 << 14, "device sample used again"),
         (1 << 15, "ticks missed before this one"),
+        (1 << 31, "the device's motors were off"),
         (Self::from_guard(GuardStatus::LIMITED).0, "guard: force or torque at its limit"),
         (Self::from_guard(GuardStatus::SLEWED).0, "guard: force changes too fast"),
         (Self::from_guard(GuardStatus::POWER_LIMITED).0, "guard: power at its limit"),

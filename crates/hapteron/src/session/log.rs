@@ -67,7 +67,7 @@ pub struct Log {
 }
 
 /// Bits of a record that come from the loop and not from the tick.
-const OF_THE_LOOP: Flags = Flags::SAMPLE_REPEATED.with(Flags::DEADLINE_MISSED);
+const OF_THE_LOOP: Flags = Flags::SAMPLE_REPEATED.with(Flags::DEADLINE_MISSED).with(Flags::DEVICE_OFF);
 
 impl Log {
     /// A log without ticks.

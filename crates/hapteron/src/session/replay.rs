@@ -2,7 +2,9 @@
 
 use super::log::Log;
 use super::real_time::depth;
-use super::{Command, ContactPass, ContactSnapshot, HapticState, Settings, View, apply, handle_speed, tick};
+use super::{
+    Command, ContactPass, ContactSnapshot, Flags, HapticState, Settings, View, apply, handle_speed, tick,
+};
 use crate::recording::{Recording, Row};
 use crate::scene::{Scene, handle_at};
 use hapteron_device::guard::{Guard, GuardError};
@@ -80,6 +82,9 @@ impl<'a> Replay<'a> {
         {
             apply(&mut self.settings, &mut self.haptic, command);
         }
+        if row.flags.contains(Flags::DEVICE_OFF) {
+            self.haptic.interrupted();
+        }
         self.take(row.contacts_of);
         let mut result = tick(&self.settings, &self.haptic, &row.sample, &self.current, row.time);
         self.haptic = result.after;
@@ -92,9 +97,6 @@ impl<'a> Replay<'a> {
         let depth = depth(self.scene, distance);
         let of = &self.settings.body;
         recording.push(Row::of_body(self.scene, of, row.time, &result, depth, counts), &result);
-        if result.flags.no_force() && recording.fault_time.is_none() {
-            recording.fault_time = Some(row.time);
-        }
     }
 
     /// The pass that looks at the newest state. Answers the distance that it found.

@@ -82,6 +82,13 @@ impl HapticState {
         Self { guard: Some(guard), ..Self::new(state) }
     }
 
+    /// The device displayed nothing of late: what it is given from now on begins at zero.
+    pub fn interrupted(&mut self) {
+        if let Some(guard) = &mut self.guard {
+            guard.interrupted();
+        }
+    }
+
     /// Takes the body's momentum away.
     pub fn stand_still(&mut self) {
         self.state.linear_momentum = Vector3::zeros();
@@ -100,6 +107,8 @@ pub struct Tick {
     pub step: Step,
     /// For the device, in the device's scale.
     pub command: DeviceCommand,
+    /// The same before the guard, which has also left out what the device has no motors for.
+    pub wanted: DeviceCommand,
     /// How old the state is that the contacts were found at, seconds.
     pub contact_age: f64,
     /// Anything unusual.
@@ -155,6 +164,7 @@ pub fn tick(
         next = Step { state: before.state, status: next.status, ..stopped(&before.state) };
     }
     let contact_age = now - contacts.time();
+    let wanted = command;
     let mut guard = before.guard;
     if let Some(guard) = &mut guard {
         let sample_age = now - sample.time;
@@ -175,6 +185,7 @@ pub fn tick(
         handle,
         step: next,
         command,
+        wanted,
         contact_age,
         flags,
     }

@@ -211,9 +211,6 @@ pub fn run_virtual_for(
             recording.cancelled = true;
             break;
         }
-        if result.flags.no_force() && recording.fault_time.is_none() {
-            recording.fault_time = Some(i as f64 * scene.time_step);
-        }
     }
     Ok(recording)
 }

@@ -1,9 +1,12 @@
 //! What a hand would feel: pushes, releases, energy, with friction, encoders, saturation and the guard.
 
-use super::rig::{DT, Rig, Tool, bilateral, floor, premium};
+use super::rig::{DT, Rig, Tool, at, bilateral, floor, premium};
 use hapteron::device::guard::{Guard, GuardSettings};
 use hapteron::device::simulated::SimulatedSettings;
-use hapteron::device::{Device, Grip};
+use hapteron::device::{Device, DeviceSample, Grip};
+use hapteron::dynamics::State;
+use hapteron::session::{ContactSnapshot, HapticState, tick};
+use nalgebra::{UnitQuaternion, Vector3};
 
 fn guard(device: &SimulatedSettings) -> Guard {
     Guard::new(GuardSettings::for_device(&device.model.capabilities(), DT)).unwrap()
@@ -147,4 +150,56 @@ fn the_passivity_controller_tames_what_would_oscillate() {
         assert!(without > 1.0, "the test needs an oscillation: {without} N");
         assert!(with < 0.35, "{with} N");
     }
+}
+
+/// Would catch a hand that feels in free space anything but the body's mass: handle moved to and fro, force by its acceleration. G.5 (8).
+#[test]
+fn in_free_space_the_hand_feels_the_body_s_mass() {
+    let mut worst = 0.0f64;
+    for frequency in [0.5, 1.0, 2.0, 5.0] {
+        for (mass, stiffness) in
+            [0.001, 0.01, 0.1].iter().flat_map(|m| [200.0, 500.0, 1000.0].map(|k| (*m, k)))
+        {
+            let tool = Tool { mass, stiffness, damping: 4.0 };
+            let settings = tool.settings();
+            let w = std::f64::consts::TAU * frequency;
+            let amplitude = 0.02;
+            let zero = Vector3::zeros();
+            let start = Vector3::z() * (amplitude * w);
+            let state = State::moving(&settings.body, zero, &UnitQuaternion::identity(), &start, &zero);
+            let contacts = ContactSnapshot::of_planes(&[], &settings.body, &state, 0.0);
+            let mut haptic = HapticState::new(state);
+            // Projected on sine and cosine over whole periods, after one second.
+            let ticks = (4.0 / DT) as u32;
+            let (mut in_phase, mut across) = (0.0, 0.0);
+            for i in 1..=ticks {
+                let t = f64::from(i) * DT;
+                let sample = DeviceSample {
+                    time: t,
+                    linear_velocity: Vector3::z() * (amplitude * w * (w * t).cos()),
+                    ..at(amplitude * (w * t).sin())
+                };
+                let result = tick(&settings, &haptic, &sample, &contacts, t);
+                haptic = result.after;
+                if 2 * i > ticks {
+                    let force = result.command.force.z * 4.0 / f64::from(ticks);
+                    (in_phase, across) = (in_phase + force * (w * t).sin(), across + force * (w * t).cos());
+                }
+            }
+            let felt = f64::hypot(in_phase, across) / (amplitude * w * w);
+            // |m (k + b s) / (m s^2 + b s + k)| at s = i w: the mass, but for the coupling's own resonance.
+            let (k, b) = (stiffness, tool.damping);
+            let expected = mass * f64::hypot(k, b * w) / f64::hypot(k - mass * w * w, b * w);
+            assert!(
+                (felt / expected - 1.0).abs() < 0.1,
+                "{frequency} Hz, {mass} kg, k_c {k}: {felt} kg, expected {expected}"
+            );
+            // Where the resonance is far, it is the mass.
+            if mass * w * w / k < 0.05 {
+                worst = worst.max((felt / mass - 1.0).abs());
+                assert!((felt / mass - 1.0).abs() < 0.1, "{frequency} Hz, {mass} kg, k_c {k}: {felt} kg");
+            }
+        }
+    }
+    println!("the mass felt is within {:.1} % of the body's", worst * 100.0);
 }

@@ -7,7 +7,7 @@ mod window;
 use crate::arguments::Bench;
 use crate::commands::run::checked;
 use crate::progress;
-use crate::report::distribution_json;
+use crate::report::{self, distribution_json};
 use anyhow::{Result, bail};
 use hapteron::dynamics::{ContactForce, ContactPlane, Method, Problem, step};
 use hapteron::scene::Scene;
@@ -58,6 +58,7 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode> {
                 "pass_ns": distribution_json(&timing.pass),
                 "contact_age_ns": distribution_json(&timing.contact_age),
                 "missed": timing.missed,
+                "lateness_99_9_ratio": report::ratio_json(&timing),
             },
             "priority": bare.priority.to_string(),
         });
@@ -75,6 +76,9 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode> {
     lateness(&mut out, "a bare loop alone", &bare.lateness, bare.missed)?;
     lateness(&mut out, "a session", &timing.lateness, timing.missed)?;
     lateness(&mut out, "a bare loop between its ticks", &timing.bare_lateness, 0)?;
+    if let Some(ratio) = timing.lateness_ratio() {
+        writeln!(out, "  99.9 % of the session's lateness is {ratio}")?;
+    }
     writeln!(
         out,
         "  a tick computes for {:.1} us, 99 %: {:.1} us",
@@ -101,12 +105,15 @@ fn us(ns: u64) -> f64 {
 }
 
 fn lateness(out: &mut impl Write, what: &str, d: &Distribution, missed: u64) -> std::io::Result<()> {
+    let [low, high] = d.quantile_between_ns(0.999);
     writeln!(
         out,
-        "  {what:30} within 50 us {:6.2} %   99 % {:7.1} us   99.9 % {:7.1} us   greatest {:7.1} us   missed {missed} of {}",
+        "  {what:30} within 50 us {:6.2} %   99 % {:7.1} us   99.9 % {:7.1} us ({:.1} to {:.1})   greatest {:7.1} us   missed {missed} of {}",
         d.share_up_to(50_000) * 100.0,
         us(d.quantile_ns(0.99)),
         us(d.quantile_ns(0.999)),
+        us(low),
+        us(high),
         us(d.greatest_ns),
         d.count
     )

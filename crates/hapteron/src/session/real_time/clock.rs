@@ -3,8 +3,14 @@
 
 use std::time::Duration;
 
-/// How long before a deadline sleeping ends and spinning begins. Sleepers wake up to about 100 us late on the machines measured.
+/// How long before a deadline sleeping ends and spinning begins, at the least; see [`Margin`].
 pub const SPIN: Duration = Duration::from_micros(100);
+/// Spinning takes no more of a period than this share (or the least, where that is more).
+const MOST_SPIN: f64 = 0.3;
+/// A margin covers the latest waking times this.
+const COVER: f64 = 1.5;
+/// Sleeps after which a margin has forgotten two thirds of what it learned.
+const MEMORY: u64 = 8192;
 
 /// Nanoseconds of a clock that never steps. Real time.
 #[cfg(target_os = "linux")]
@@ -51,12 +57,46 @@ pub fn sleep_until(wake_ns: u64) {
     }
 }
 
-/// Waits until a deadline as exactly as the machine can: asleep until `spin_ns` before it, then spinning. Answers the time.
-pub fn wait_until(deadline_ns: u64, spin_ns: u64) -> u64 {
+/// How long before a deadline sleeping ends, learned from how late the system woke the thread before: a virtual machine whose CPU was put
+/// to sleep by its host wakes hundreds of microseconds late a few times a second, others never do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Margin {
+    now_ns: u64,
+    least_ns: u64,
+    most_ns: u64,
+}
+
+impl Margin {
+    /// At its least, which is `spin`.
+    #[must_use]
+    pub fn new(spin: Duration, period_ns: u64) -> Self {
+        let least_ns = spin.as_nanos() as u64;
+        let most_ns = ((period_ns as f64 * MOST_SPIN) as u64).max(least_ns);
+        Self { now_ns: least_ns, least_ns, most_ns }
+    }
+
+    /// Nanoseconds.
+    #[must_use]
+    pub fn ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// Takes by how much a waking was late.
+    fn learn(&mut self, late_ns: u64) {
+        let forgotten = self.now_ns - (self.now_ns - self.least_ns).div_ceil(MEMORY);
+        let wanted = (late_ns as f64 * COVER) as u64;
+        self.now_ns = forgotten.max(wanted).clamp(self.least_ns, self.most_ns);
+    }
+}
+
+/// Waits until a deadline as exactly as the machine can: asleep until a margin before it, then spinning. Answers the time.
+pub fn wait_until(deadline_ns: u64, margin: &mut Margin) -> u64 {
     let mut now = now_ns();
-    if now + spin_ns < deadline_ns {
-        sleep_until(deadline_ns - spin_ns);
+    let wake_ns = deadline_ns.saturating_sub(margin.ns());
+    if now < wake_ns {
+        sleep_until(wake_ns);
         now = now_ns();
+        margin.learn(now.saturating_sub(wake_ns));
     }
     while now < deadline_ns {
         std::hint::spin_loop();
@@ -91,7 +131,7 @@ pub struct Beat {
 pub struct Metronome {
     epoch_ns: u64,
     period_ns: u64,
-    spin_ns: u64,
+    margin: Margin,
     next: u64,
 }
 
@@ -99,7 +139,8 @@ impl Metronome {
     /// The first beat comes one period after `epoch_ns`.
     #[must_use]
     pub fn new(epoch_ns: u64, period_ns: u64, spin: Duration) -> Self {
-        Self { epoch_ns, period_ns: period_ns.max(1), spin_ns: spin.as_nanos() as u64, next: 1 }
+        let period_ns = period_ns.max(1);
+        Self { epoch_ns, period_ns, margin: Margin::new(spin, period_ns), next: 1 }
     }
 
     /// The deadline that is waited for next.
@@ -110,7 +151,7 @@ impl Metronome {
 
     /// Waits for the next beat.
     pub fn wait(&mut self) -> Beat {
-        let started_ns = wait_until(self.deadline_ns(), self.spin_ns);
+        let started_ns = wait_until(self.deadline_ns(), &mut self.margin);
         self.beat(started_ns)
     }
 
@@ -125,13 +166,13 @@ impl Metronome {
 
     /// Waits until the middle between the last beat and the next; tells by how much it was late, or nothing when it was too late to wait
     /// without haste.
-    pub fn wait_between(&self) -> Option<u64> {
+    pub fn wait_between(&mut self) -> Option<u64> {
         let middle = self.deadline_ns().saturating_sub(self.period_ns / 2);
-        let room = self.spin_ns + self.period_ns / 20;
+        let room = self.margin.ns() + self.period_ns / 20;
         if now_ns() + room > middle {
             return None;
         }
-        Some(wait_until(middle, self.spin_ns).saturating_sub(middle))
+        Some(wait_until(middle, &mut self.margin).saturating_sub(middle))
     }
 }
 
@@ -149,6 +190,23 @@ mod tests {
         let very_late = m.beat(1_007_500);
         assert_eq!((very_late.index, very_late.lateness_ns, very_late.missed), (7, 4500, 4));
         assert_eq!(m.deadline_ns(), 1_008_000);
+    }
+
+    /// Would catch a margin that does not follow late wakings, takes the whole period, or never lets go of one that was very late.
+    #[test]
+    fn the_margin_follows_how_late_the_system_wakes() {
+        let mut margin = Margin::new(SPIN, 1_000_000);
+        let mut after = |late_us: u64, sleeps: u32| {
+            (0..sleeps).for_each(|_| margin.learn(late_us * 1000));
+            margin.ns()
+        };
+        assert_eq!(after(5, 10_000), 100_000);
+        assert_eq!(after(140, 1), 210_000);
+        assert_eq!(after(5000, 1), 300_000);
+        let second_later = after(5, 1000);
+        assert!((270_000..280_000).contains(&second_later), "{second_later}");
+        assert!(after(5, 100_000) < 101_000);
+        assert_eq!(Margin::new(SPIN, 125_000).most_ns, 100_000);
     }
 
     /// Would catch a wait that ends early: the one thing that a busy machine cannot excuse.

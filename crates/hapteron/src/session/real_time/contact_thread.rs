@@ -74,13 +74,13 @@ impl ContactLoop {
             if self.shared.is_ending() {
                 return None;
             }
-            let expected = self.ends.states.output_buffer().next_ns;
+            let expected = self.ends.states.value().next_ns;
             let now = clock::now_ns();
             let poll = if looks > 50 { LONG_POLL_NS } else { POLL_NS };
             clock::sleep_until(expected.max(now + poll).min(now + 2_000_000));
             looks += 1;
         }
-        Some(*self.ends.states.output_buffer())
+        Some(*self.ends.states.value())
     }
 
     /// One pass. `interval_ns` is the time since the pass before it began; `show` tells whether others are to see what it finds.
@@ -99,15 +99,15 @@ impl ContactLoop {
         let levels_watched = show && self.shared.levels_watched();
         self.pass.watch_levels(levels_watched);
         let ContactsEnd { contacts, passes, shown, levels, .. } = &mut self.ends;
-        let found: &mut Found = contacts.input_buffer_mut();
+        let found: &mut Found = contacts.slot();
         found.of_tick = seen.of_tick;
         let in_margin = self.pass.look(&self.scene, &view, &mut found.snapshot);
         if show {
-            shown.input_buffer_mut().clone_from(&found.snapshot);
+            shown.slot().clone_from(&found.snapshot);
             shown.publish();
         }
         if levels_watched {
-            self.pass.levels_in_use(levels.input_buffer_mut());
+            self.pass.levels_in_use(levels.slot());
             levels.publish();
         }
         let duration_ns = clock::now_ns().saturating_sub(begun);

@@ -1,12 +1,11 @@
-//! What goes between the threads, and by which way: newest values through triple buffers, every record and command through bounded rings.
+//! What goes between the threads, and by which way: newest values through three slots, every record and command through bounded rings ([`hapteron_exchange`]).
 //! Both are wait-free on both sides and allocate nothing after the start; no thread can hold another up, dead or alive.
 
 use super::telemetry::{PassRecord, TickRecord};
 use crate::scene::ContactModel;
 use crate::session::{Command, ContactLaw, ContactSnapshot, LevelsInUse};
 use hapteron_dynamics::{Handle, RigidBody, State};
-use rtrb::{Consumer, Producer, RingBuffer};
-use triple_buffer::{Input, Output, triple_buffer};
+use hapteron_exchange::{Consumer, Producer, Reader, Writer, newest, ring};
 
 /// Commands that may wait; one is applied a tick.
 const COMMANDS: usize = 256;
@@ -34,9 +33,9 @@ pub struct Seen {
 
 /// The haptic thread's ends.
 pub(super) struct HapticEnd {
-    contacts: Output<Found>,
-    states: Input<Seen>,
-    latest: Input<TickRecord>,
+    contacts: Reader<Found>,
+    states: Writer<Seen>,
+    latest: Writer<TickRecord>,
     records: Producer<TickRecord>,
     commands: Consumer<Command>,
 }
@@ -49,7 +48,7 @@ impl HapticEnd {
 
     /// Real time.
     pub fn next_command(&mut self) -> Option<Command> {
-        self.commands.pop().ok()
+        self.commands.pop()
     }
 
     /// Real time.
@@ -66,22 +65,22 @@ impl HapticEnd {
 
 /// The contact thread's ends.
 pub(super) struct ContactsEnd {
-    pub states: Output<Seen>,
-    pub contacts: Input<Found>,
+    pub states: Reader<Seen>,
+    pub contacts: Writer<Found>,
     pub passes: Producer<PassRecord>,
     /// For those who look on.
-    pub shown: Input<ContactSnapshot>,
-    pub levels: Input<LevelsInUse>,
+    pub shown: Writer<ContactSnapshot>,
+    pub levels: Writer<LevelsInUse>,
 }
 
 /// The ends of whoever watches and steers.
 pub(super) struct OuterEnd {
-    pub latest: Output<TickRecord>,
+    pub latest: Reader<TickRecord>,
     pub records: Consumer<TickRecord>,
     pub passes: Consumer<PassRecord>,
     pub commands: Producer<Command>,
-    pub shown: Output<ContactSnapshot>,
-    pub levels: Output<LevelsInUse>,
+    pub shown: Reader<ContactSnapshot>,
+    pub levels: Reader<LevelsInUse>,
 }
 
 /// Makes all ways, with memory that has been touched. `room` is how many records may wait to be drained.
@@ -89,18 +88,17 @@ pub(super) fn exchange(
     found: &Found,
     seen: &Seen,
     first: &TickRecord,
+    first_pass: &PassRecord,
     room: usize,
 ) -> (HapticEnd, ContactsEnd, OuterEnd) {
-    let (contacts_in, contacts_out) = triple_buffer(found);
-    let (states_in, states_out) = triple_buffer(seen);
-    let (latest_in, latest_out) = triple_buffer(first);
-    let (shown_in, shown_out) = triple_buffer(&found.snapshot);
-    let (levels_in, levels_out) = triple_buffer(&LevelsInUse::default());
-    let (mut records_in, mut records_out) = RingBuffer::new(room);
-    let (passes_in, passes_out) = RingBuffer::new(room);
-    let (commands_in, commands_out) = RingBuffer::new(COMMANDS);
-    while records_in.push(*first).is_ok() {}
-    while records_out.pop().is_ok() {}
+    let (contacts_in, contacts_out) = newest(found);
+    let (states_in, states_out) = newest(seen);
+    let (latest_in, latest_out) = newest(first);
+    let (shown_in, shown_out) = newest(&found.snapshot);
+    let (levels_in, levels_out) = newest(&LevelsInUse::default());
+    let (records_in, records_out) = ring(*first, room);
+    let (passes_in, passes_out) = ring(*first_pass, room);
+    let (commands_in, commands_out) = ring(Command::Stop, COMMANDS);
     let haptic = HapticEnd {
         contacts: contacts_out,
         states: states_in,

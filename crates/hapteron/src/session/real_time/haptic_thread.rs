@@ -5,7 +5,9 @@ use super::exchange::{Found, HapticEnd, Seen};
 use super::shared::{End, Shared, SharedDevice, message};
 use super::telemetry::{TickRecord, add};
 use crate::session::{Command, Flags, HapticState, Settings, apply, tick};
-use hapteron_device::{Applied, DeviceCommand, DeviceFault, DeviceSample, Pacing};
+use hapteron_device::{
+    Applied, Capabilities, DeviceCommand, DeviceFault, DeviceSample, Pacing, undeliverable,
+};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -31,10 +33,14 @@ pub(super) struct Loop {
     pub duration: Option<f64>,
     /// Samples may fail to come for so long.
     pub late_limit_ns: u64,
+    /// What the device can do.
+    pub capabilities: Capabilities,
     /// Measure the lateness of a bare loop between the ticks.
     pub bare: bool,
     pub hook: Option<TickHook>,
     pub ticks: u64,
+    /// The last command was not displayed.
+    pub device_off: bool,
     /// As the device gave it, and when (on our clock).
     pub last: DeviceSample,
     pub last_fresh_ns: u64,
@@ -181,7 +187,9 @@ impl Loop {
         let Some(mut device) = device.claim() else { return Err(End::HapticFrozen) };
         match device.write(command) {
             Ok(Applied::Fully) => Ok(()),
-            Ok(Applied::Scaled(_) | Applied::Disabled) => {
+            Ok(applied @ (Applied::Scaled(_) | Applied::Disabled)) => {
+                let drives = self.capabilities.drives_force || self.capabilities.drives_torque;
+                self.device_off = applied == Applied::Disabled && drives;
                 add(&self.shared.telemetry.limited_by_device, 1);
                 Ok(())
             }
@@ -207,12 +215,21 @@ impl Loop {
             self.last_time = instant.time;
         }
         self.last = *sample;
+        let off = std::mem::take(&mut self.device_off);
+        if off {
+            self.haptic.interrupted();
+        }
         let sample = DeviceSample { time: self.last_time, ..*sample };
         let found: &Found = self.ends.newest_contacts();
         let mut result = tick(&self.settings, &self.haptic, &sample, &found.snapshot, instant.time);
         let (contacts_of, counts) = (found.of_tick, (found.snapshot.contacts(), found.snapshot.clusters()));
         self.haptic = result.after;
-        for (bit, set) in [(Flags::SAMPLE_REPEATED, repeated), (Flags::DEADLINE_MISSED, instant.missed > 0)] {
+        let bits = [
+            (Flags::SAMPLE_REPEATED, repeated),
+            (Flags::DEADLINE_MISSED, instant.missed > 0),
+            (Flags::DEVICE_OFF, off),
+        ];
+        for (bit, set) in bits {
             if set {
                 result.flags = result.flags.with(bit);
             }
@@ -254,6 +271,7 @@ impl Loop {
     /// Histograms, counts and the record of a tick.
     fn tell(&mut self, record: &TickRecord, instant: &Instant) {
         let telemetry = &self.shared.telemetry;
+        telemetry.left_out(&undeliverable(&self.capabilities, &record.result.wanted));
         if self.last_start_ns > 0 {
             telemetry.period.record(instant.started_ns.saturating_sub(self.last_start_ns));
         }

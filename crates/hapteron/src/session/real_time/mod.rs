@@ -32,7 +32,7 @@ pub use running::{Finished, Running, Told};
 pub use scene_device::SceneDevice;
 pub use shared::End;
 pub use system::{Grant, Grants};
-pub use telemetry::{PassRecord, TickRecord, Timing};
+pub use telemetry::{LatenessRatio, PassRecord, TickRecord, Timing, Undelivered};
 
 use super::contact_pass::sample_speed;
 use super::{Command, ContactLaw, ContactPass, ContactSnapshot, Flags, HapticState, Settings, View, tick};
@@ -67,7 +67,7 @@ pub struct RealTimeOptions {
     pub contact_cpu: Option<usize>,
     /// Lock the pages that the process has at the start.
     pub lock_memory: bool,
-    /// Spinning begins so long before a deadline.
+    /// Spinning begins at least so long before a deadline; longer where the system wakes late ([`clock::Margin`]).
     pub spin: Duration,
     /// End after so many seconds.
     pub duration: Option<f64>,
@@ -196,7 +196,8 @@ fn launch(
         next_ns: clock::now_ns(),
     };
     let first = first_record(&settings, &haptic, &sample, &found);
-    let (haptic_end, mut contacts_end, mut outer) = exchange(&found, &seen, &first, options.room.max(64));
+    let (haptic_end, mut contacts_end, mut outer) =
+        exchange(&found, &seen, &first, &first_pass, options.room.max(64));
     // The start has been looked at.
     contacts_end.states.update();
     let _ = contacts_end.passes.push(first_pass);
@@ -204,6 +205,7 @@ fn launch(
         let _ = outer.commands.push(Command::Attach);
     }
     let shared = Arc::new(Shared::default());
+    let capabilities = device.capabilities().clone();
     let device = Arc::new(SharedDevice::new(device));
     let contact_loop = ContactLoop {
         look: Lookahead::new(scene.contact.period + scene.contact.latency),
@@ -223,9 +225,11 @@ fn launch(
         spin: options.spin,
         duration: options.duration,
         late_limit_ns: options.late_limit.as_nanos() as u64,
+        capabilities,
         bare: options.bare,
         hook: options.tick_hook,
         ticks: 0,
+        device_off: false,
         last: sample,
         last_fresh_ns: 0,
         last_time: 0.0,

@@ -52,9 +52,6 @@ impl Recorder {
         // How deep it is, is known when its pass is, or measured at the end.
         let unknown = f64::NAN;
         let row = Row::of_body(&self.scene, &self.body, record.time, &record.result, unknown, record.counts);
-        if row.flags.no_force() && self.recording.fault_time.is_none() {
-            self.recording.fault_time = Some(record.time);
-        }
         self.recording.push(row, &record.result);
         self.log.push(record);
         self.timing.push((record.lateness_ns, record.compute_ns));

@@ -107,13 +107,13 @@ impl Running {
     /// [`super::RealTimeOptions::room`] wait; [`Timing::lost`] counts those that found no room.
     pub fn drain(&mut self, told: &mut dyn FnMut(Told<'_>)) {
         // Only what is there now: a fast loop must not keep its watcher for ever.
-        for _ in 0..self.outer.records.slots() {
-            if let Ok(record) = self.outer.records.pop() {
+        for _ in 0..self.outer.records.waiting() {
+            if let Some(record) = self.outer.records.pop() {
                 told(Told::Tick(&record));
             }
         }
-        for _ in 0..self.outer.passes.slots() {
-            if let Ok(record) = self.outer.passes.pop() {
+        for _ in 0..self.outer.passes.waiting() {
+            if let Some(record) = self.outer.passes.pop() {
                 told(Told::Pass(&record));
             }
         }

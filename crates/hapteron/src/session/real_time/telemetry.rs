@@ -2,7 +2,7 @@
 
 use super::histogram::{Distribution, Histogram};
 use crate::session::{Command, Tick};
-use hapteron_device::DeviceSample;
+use hapteron_device::{DeviceCommand, DeviceSample};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// All of one tick.
@@ -61,6 +61,10 @@ pub struct Telemetry {
     pub(super) lost_passes: AtomicU64,
     pub(super) repeated: AtomicU64,
     pub(super) limited_by_device: AtomicU64,
+    undelivered: AtomicU64,
+    /// The bits of a number: N and N m.
+    undelivered_force: AtomicU64,
+    undelivered_torque: AtomicU64,
 }
 
 /// Adds to a count that only the calling thread writes. Real time.
@@ -95,6 +99,53 @@ pub struct Timing {
     pub repeated: u64,
     /// Ticks whose command the device did not display fully.
     pub limited_by_device: u64,
+    /// What the device has no motors for and left out.
+    pub undelivered: Undelivered,
+}
+
+/// The part of the commands that a device has no motors for ([`hapteron_device::undeliverable`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Undelivered {
+    /// Ticks with such a part.
+    pub ticks: u64,
+    /// The greatest, N.
+    pub greatest_force: f64,
+    /// The greatest, N m.
+    pub greatest_torque: f64,
+}
+
+impl Timing {
+    /// The 99.9 % of the ticks' lateness as a multiple of the bare loop's, and between which multiples it lies with at least 90 % confidence
+    /// (each of the two within its own interval of 95 %). None where no bare loop was measured.
+    #[must_use]
+    pub fn lateness_ratio(&self) -> Option<LatenessRatio> {
+        const SHARE: f64 = 0.999;
+        let (session, bare) = (&self.lateness, &self.bare_lateness);
+        // The clock tells no less than a nanosecond.
+        let ratio = |s: u64, b: u64| s.max(1) as f64 / b.max(1) as f64;
+        let ([session_low, session_high], [bare_low, bare_high]) =
+            (session.quantile_between_ns(SHARE), bare.quantile_between_ns(SHARE));
+        (session.count > 0 && bare.count > 0).then(|| LatenessRatio {
+            ratio: ratio(session.quantile_ns(SHARE), bare.quantile_ns(SHARE)),
+            between: [ratio(session_low, bare_high), ratio(session_high, bare_low)],
+        })
+    }
+}
+
+/// See [`Timing::lateness_ratio`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LatenessRatio {
+    /// Of the two 99.9 %.
+    pub ratio: f64,
+    /// Least and greatest that the numbers of durations allow.
+    pub between: [f64; 2],
+}
+
+impl std::fmt::Display for LatenessRatio {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { ratio, between: [least, greatest] } = self;
+        write!(f, "{ratio:.2} times the bare loop's (90 % sure: {least:.2} to {greatest:.2})")
+    }
 }
 
 impl Telemetry {
@@ -115,6 +166,28 @@ impl Telemetry {
             lost: count(&self.lost) + count(&self.lost_passes),
             repeated: count(&self.repeated),
             limited_by_device: count(&self.limited_by_device),
+            undelivered: Undelivered {
+                ticks: count(&self.undelivered),
+                greatest_force: f64::from_bits(count(&self.undelivered_force)),
+                greatest_torque: f64::from_bits(count(&self.undelivered_torque)),
+            },
+        }
+    }
+
+    /// Takes what a device leaves out of a command. Real time.
+    pub(super) fn left_out(&self, part: &DeviceCommand) {
+        if *part == DeviceCommand::zero() {
+            return;
+        }
+        add(&self.undelivered, 1);
+        for (most, vector) in
+            [(&self.undelivered_force, &part.force), (&self.undelivered_torque, &part.torque)]
+        {
+            // Zero has no bits.
+            let size = vector.norm_squared().sqrt();
+            if size > f64::from_bits(most.load(Ordering::Relaxed)) {
+                most.store(size.to_bits(), Ordering::Relaxed);
+            }
         }
     }
 }
