@@ -152,7 +152,7 @@ pub(super) fn moved_block_box(block: &TriangleBlock, motion: &Rigid, margin: f32
 
 /// Squared distances of a point (from the block's origin) to the triangles of a block.
 #[inline(always)]
-pub(super) fn point_triangles(p: [f32; 3], b: &TriangleBlock) -> [f32; LANES] {
+pub(crate) fn point_triangles(p: [f32; 3], b: &TriangleBlock) -> [f32; LANES] {
     let mut squared = [0.0; LANES];
     for l in 0..LANES {
         let q = [p[0] - b.corner[0][l], p[1] - b.corner[1][l], p[2] - b.corner[2][l]];
@@ -185,7 +185,7 @@ fn beside(along: f32, length: f32, across: f32) -> f32 {
 
 /// The least of eight.
 #[inline(always)]
-pub(super) fn least(values: &[f32; LANES]) -> f32 {
+pub(crate) fn least(values: &[f32; LANES]) -> f32 {
     let lesser = |a: f32, b: f32| if a < b { a } else { b };
     let mut half = [0.0; 4];
     for l in 0..4 {
@@ -206,7 +206,7 @@ pub(super) fn below(values: &[f32; LANES], limit: f32) -> u32 {
 
 /// Bit `i` is set when value `i` is at most `limit`.
 #[inline(always)]
-pub(super) fn at_most(values: &[f32; LANES], limit: f32) -> u32 {
+pub(crate) fn at_most(values: &[f32; LANES], limit: f32) -> u32 {
     let mut hit = [0u32; LANES];
     for l in 0..LANES {
         hit[l] = u32::from(values[l] <= limit) << l;

@@ -8,7 +8,7 @@
 //! fraction of the cost of listing all pairs of close triangles.
 
 pub(crate) mod feature;
-mod kernel;
+pub(crate) mod kernel;
 mod result;
 mod ridge_kernel;
 mod ridges;
