@@ -12,7 +12,7 @@ pub(crate) struct Nearest {
     pub squared: f64,
     pub triangle: u32,
     pub leaf: u32,
-    stack: Vec<(f32, u32)>,
+    pub stack: Vec<(f32, u32)>,
 }
 
 impl Nearest {
@@ -36,7 +36,9 @@ impl Nearest {
             }
             if index & LEAF != 0 {
                 let leaf = index & !LEAF;
-                if leaf != guess && !self.misses_slab(surface, leaf, p, slack) {
+                if leaf != guess
+                    && !misses_slab(surface, leaf, p, slack, self.squared.sqrt() as f32 * (1.0 + 1e-6))
+                {
                     self.look(surface, leaf, p);
                 }
                 continue;
@@ -65,15 +67,6 @@ impl Nearest {
         self.triangle != NOWHERE
     }
 
-    /// Whether the slab around a leaf is farther away than what was found.
-    #[inline(always)]
-    fn misses_slab(&self, surface: &Surface, leaf: u32, p: Vec3, slack: f32) -> bool {
-        let leaf = &surface.leaves[leaf as usize];
-        let height = dot(leaf.normal.map(f64::from), p);
-        let beyond = (f64::from(leaf.low) - height).max(height - f64::from(leaf.high)) - f64::from(slack);
-        beyond > 0.0 && beyond * beyond > self.squared
-    }
-
     #[inline(always)]
     fn look(&mut self, surface: &Surface, leaf: u32, p: Vec3) {
         let (squared, lane) = point_leaf(p, surface, &surface.leaves[leaf as usize]);
@@ -98,9 +91,18 @@ pub(crate) fn search(
     nearest.search(surface, p, guess, limit, slack)
 }
 
+/// Whether the slab around a leaf is farther away than a distance.
+#[inline(always)]
+pub(crate) fn misses_slab(surface: &Surface, leaf: u32, p: Vec3, slack: f32, than: f32) -> bool {
+    let leaf = &surface.leaves[leaf as usize];
+    let height = dot(leaf.normal.map(f64::from), p);
+    let beyond = (f64::from(leaf.low) - height).max(height - f64::from(leaf.high)) - f64::from(slack);
+    beyond > f64::from(than)
+}
+
 /// Squared distances of a point to the boxes of a node's children, from below.
 #[inline(always)]
-fn box_distances(node: &Node, p: [f32; 3], slack: f32) -> [f32; LANES] {
+pub(crate) fn box_distances(node: &Node, p: [f32; 3], slack: f32) -> [f32; LANES] {
     let mut squared = [0.0; LANES];
     for l in 0..LANES {
         let mut sum = 0.0;

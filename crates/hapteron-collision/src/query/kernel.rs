@@ -162,7 +162,7 @@ pub(super) fn moved_block_box(block: &TriangleBlock, motion: &Rigid, margin: f32
 
 /// Squared distances of a point (from the block's origin) to the triangles of a block.
 #[inline(always)]
-pub(super) fn point_triangles(p: [f32; 3], b: &TriangleBlock) -> [f32; LANES] {
+pub(crate) fn point_triangles(p: [f32; 3], b: &TriangleBlock) -> [f32; LANES] {
     let q = [0, 1, 2].map(|k| f32x8::splat(p[k]) - lanes(b.corner[k]));
     let part =
         |axis: &[[f32; LANES]; 3]| lanes(axis[0]) * q[0] + lanes(axis[1]) * q[1] + lanes(axis[2]) * q[2];
@@ -214,7 +214,7 @@ fn beside(along: f32x8, length: f32x8, across: f32x8) -> f32x8 {
 
 /// The least of eight.
 #[inline(always)]
-pub(super) fn least(values: &[f32; LANES]) -> f32 {
+pub(crate) fn least(values: &[f32; LANES]) -> f32 {
     let lesser = |a: f32, b: f32| if a < b { a } else { b };
     let mut half = [0.0; 4];
     for l in 0..4 {
@@ -231,7 +231,7 @@ pub(super) fn below(values: &[f32; LANES], limit: f32) -> u32 {
 
 /// Bit `i` is set when value `i` is at most `limit`.
 #[inline(always)]
-pub(super) fn at_most(values: &[f32; LANES], limit: f32) -> u32 {
+pub(crate) fn at_most(values: &[f32; LANES], limit: f32) -> u32 {
     lanes(*values).simd_le(f32x8::splat(limit)).to_bitmask()
 }
 

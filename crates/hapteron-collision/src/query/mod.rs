@@ -9,7 +9,7 @@
 
 mod deep;
 pub(crate) mod feature;
-mod kernel;
+pub(crate) mod kernel;
 mod nearest;
 mod result;
 mod ridge_kernel;

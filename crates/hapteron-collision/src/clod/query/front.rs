@@ -4,20 +4,21 @@
 //! changes by more than the surfaces have moved, that bounds its distance now, so most nodes are passed or refused without
 //! a search. And for every node how far it is replaced by its children, so that levels change smoothly.
 
+use super::known::Known;
 use super::metric::Judge;
 use super::side::Search;
-use crate::clod::nearest::{NOWHERE, Nearest, slack};
-use crate::clod::{Hierarchy, Node, PURE_HULL, range};
-use crate::query::feature::{self, Foot};
+use crate::clod::nearest::{Nearest, slack};
+use crate::clod::{Hierarchy, Node, PURE_HULL, Sample, range};
+use crate::query::feature::Foot;
 use crate::surface::Surface;
 use crate::vector::{Rigid, Vec3, dot, norm, sub};
 
 /// A change of level takes this many queries.
-const BLEND_STEPS: f32 = 20.0;
+pub(super) const BLEND_STEPS: f32 = 20.0;
 /// What is nearer than this many tolerances belongs to the front.
 pub(super) const REACH: f64 = 1.25;
 
-/// Searches look this many tolerances farther than they need to.
+/// Searches note what is this many tolerances farther than they need to.
 const BAND: f64 = 0.5;
 
 /// A vertex of a node and the greatest distance of the node's vertices from it.
@@ -25,17 +26,6 @@ const BAND: f64 = 0.5;
 struct Center {
     vertex: u32,
     extent: f64,
-}
-
-/// What is known of a vertex.
-#[derive(Clone, Copy, Debug)]
-struct Known {
-    /// Its distance to the other surface, or a lower bound ...
-    distance: f64,
-    /// ... that was found when the surfaces had moved this far in all.
-    at: f64,
-    /// The leaf of the other surface where its foot was; none when the distance is a lower bound.
-    leaf: u32,
 }
 
 /// A sample within the tolerance.
@@ -59,6 +49,36 @@ pub(super) struct Tally {
     pub contact: f64,
 }
 
+/// The samples of a front whose levels are settled. They stay the ones to look at until the surfaces have moved as far as the
+/// reach goes beyond the tolerance, or other levels are wanted.
+#[derive(Clone, Debug, Default)]
+struct Plan {
+    samples: Vec<Sample>,
+    /// By sample a lower bound of its distance when it was last looked at, plus what the surfaces had moved by then in all.
+    clear: Vec<f64>,
+    /// What could be within the tolerance when the surfaces have moved this far in all, less the tolerance, is not planned for.
+    until: f64,
+    /// Which levels it was made for.
+    level: f64,
+    /// What the walk came past.
+    tally: Tally,
+}
+
+impl Plan {
+    fn begin(&mut self, judge: &Judge, search: &Search<'_>) {
+        self.samples.clear();
+        self.clear.clear();
+        self.level = judge.weight * judge.leniency;
+        self.until = search.travelled + REACH * search.tolerance;
+    }
+
+    fn serves(&self, judge: &Judge, search: &Search<'_>) -> bool {
+        judge.depends_on_weight_alone()
+            && self.level == judge.weight * judge.leniency
+            && search.travelled + search.tolerance < self.until
+    }
+}
+
 /// The front of one surface.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Front {
@@ -71,6 +91,7 @@ pub(super) struct Front {
     walk: u32,
     stack: Vec<(u32, f32)>,
     nearest: Nearest,
+    plan: Plan,
     pub found: Vec<Found>,
     /// Somebody looks at the front: its nodes are noted as well.
     pub watched: bool,
@@ -81,14 +102,14 @@ impl Front {
     /// Forgets everything and makes room for a surface.
     pub(super) fn reset(&mut self, surface: &Surface, hierarchy: &Hierarchy) {
         let count = hierarchy.nodes.len();
-        let unknown = Known { distance: 0.0, at: f64::NEG_INFINITY, leaf: NOWHERE };
         *self = Self {
             centers: centers(surface, hierarchy),
-            known: vec![unknown; surface.vertices.len()],
+            known: vec![Known::UNKNOWN; surface.vertices.len()],
             open: vec![0.0; count],
             seen: vec![0; count],
             walk: 1,
             watched: self.watched,
+            plan: Plan { until: f64::NEG_INFINITY, ..Plan::default() },
             ..Self::default()
         };
     }
@@ -96,6 +117,12 @@ impl Front {
     /// The next walk chooses levels at once, without a change that takes time.
     pub(super) fn settle(&mut self) {
         self.walk += 1;
+        self.plan.until = f64::NEG_INFINITY;
+    }
+
+    /// Whether every node near the other surface is at the finest level.
+    pub(super) fn is_finest(&self) -> bool {
+        self.plan.level <= 1.0 && self.plan.until > f64::NEG_INFINITY
     }
 
     /// How far a node is replaced by its children, after a step towards what the metrics ask for.
@@ -125,46 +152,63 @@ impl Front {
         if known.distance - moved > limit {
             return false;
         }
-        if known.leaf != NOWHERE && known.distance + moved <= limit {
+        if known.exact && known.distance + moved <= limit {
             return true;
         }
         self.look(center.vertex, search, limit).is_some()
     }
 
-    /// Looks for the foot of a vertex: its place and the closest triangle, when that is within the limit.
+    /// The place of a vertex and its foot, when that is within the limit.
     #[inline(always)]
-    fn look(&mut self, vertex: u32, search: &Search<'_>, limit: f64) -> Option<(Vec3, u32)> {
+    fn look(&mut self, vertex: u32, search: &Search<'_>, limit: f64) -> Option<(Vec3, Foot)> {
         let p = search.motion.point(search.own.vertices[vertex as usize]);
-        let known = &mut self.known[vertex as usize];
         let slack = slack(search.other.radius + search.tolerance);
-        // What is only just out of reach is found too, so that it need not be sought again at every step.
-        let wider = limit + BAND * search.tolerance;
-        let found = self.nearest.search(search.other, p, known.leaf, wider, slack);
-        let distance = if found { self.nearest.squared.sqrt() } else { wider };
-        *known = Known { distance, at: search.travelled, leaf: self.nearest.leaf };
-        (distance <= limit).then_some((p, self.nearest.triangle))
-    }
-
-    /// The place of a vertex and its foot within the tolerance.
-    #[inline(always)]
-    fn foot_of(&mut self, vertex: u32, search: &Search<'_>, limit: f64) -> Option<(Vec3, Foot)> {
-        let (p, triangle) = self.look(vertex, search, limit)?;
-        Some((p, feature::foot(p, triangle, search.other)))
+        let known = &mut self.known[vertex as usize];
+        let foot = known.look(p, search, limit, BAND * search.tolerance, slack, &mut self.nearest)?;
+        Some((p, foot))
     }
 }
 
-/// Walks from the root to the front and makes `found` the samples there that are within the tolerance.
+/// Makes `found` the samples of the front that are within the tolerance.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-pub(super) fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &Judge) -> Tally {
-    front.walk += 1;
+pub(super) fn find(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &Judge) -> Tally {
     front.found.clear();
+    if !front.watched {
+        front.nodes.clear();
+    }
+    if !front.plan.serves(judge, search) || (front.watched && front.nodes.is_empty()) {
+        walk(front, hierarchy, search, judge);
+    }
+    let mut plan = core::mem::take(&mut front.plan);
+    let mut tally = plan.tally;
+    let force_from =
+        judge.detail.force_from.unwrap_or(search.tolerance).clamp(f64::MIN_POSITIVE, search.tolerance);
+    for (sample, clear) in plan.samples.iter().zip(&mut plan.clear) {
+        if *clear > search.travelled + search.tolerance {
+            continue;
+        }
+        let Some((point, foot)) = front.look(sample.vertex, search, search.tolerance) else {
+            *clear = front.known[sample.vertex as usize].distance + search.travelled;
+            continue;
+        };
+        let pressed = 1.0 - foot.signed_distance / force_from;
+        tally.contact += f64::from(sample.weight) * pressed.clamp(0.0, 1.0);
+        front.found.push(Found { vertex: sample.vertex, weight: sample.weight, point, foot });
+    }
+    front.plan = plan;
+    tally
+}
+
+/// Walks from the root to the front and plans which samples to look at.
+#[inline(always)]
+fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &Judge) {
+    front.walk += 1;
     front.nodes.clear();
+    front.plan.begin(judge, search);
     front.stack.clear();
     front.stack.push((0, 1.0));
     let mut tally = Tally::default();
     let reach = REACH * search.tolerance;
-    let force_from =
-        judge.detail.force_from.unwrap_or(search.tolerance).clamp(f64::MIN_POSITIVE, search.tolerance);
     while let Some((index, share)) = front.stack.pop() {
         if !front.is_near(front.centers[index as usize], search) {
             continue;
@@ -180,31 +224,29 @@ pub(super) fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>
         if front.watched {
             front.nodes.push(index);
         }
+        if open > 0.0 {
+            // The next query takes another step.
+            front.plan.until = f64::NEG_INFINITY;
+        }
         for sample in &hierarchy.samples[range(node.samples)] {
             let weight = sample.weight * share * (1.0 - open);
             tally.samples += 1;
             tally.near += f64::from(weight);
             let known = front.known[sample.vertex as usize];
-            if known.distance - (search.travelled - known.at) > reach {
-                continue;
-            }
-            if let Some((point, foot)) = front.foot_of(sample.vertex, search, reach) {
-                let beyond = foot.signed_distance.abs() - search.tolerance;
-                let pressed = 1.0 - foot.signed_distance / force_from;
-                tally.contact += f64::from(weight) * pressed.clamp(0.0, 1.0);
-                if beyond <= 0.0 {
-                    front.found.push(Found { vertex: sample.vertex, weight, point, foot });
-                }
+            let lower = known.distance + known.at;
+            if lower - search.travelled <= reach {
+                front.plan.samples.push(Sample { weight, ..*sample });
+                front.plan.clear.push(lower);
             }
         }
     }
-    tally
+    front.plan.tally = tally;
 }
 
 /// The place of a vertex and its foot within the limit.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
 pub(super) fn foot(front: &mut Front, search: &Search<'_>, vertex: u32, limit: f64) -> Option<(Vec3, Foot)> {
-    front.foot_of(vertex, search, limit)
+    front.look(vertex, search, limit)
 }
 
 /// By node the vertex in its middle. A node without vertices of its own is never near.

@@ -82,6 +82,11 @@ pub(super) struct Judge {
 }
 
 impl Judge {
+    /// Whether nothing but the weight tells nodes apart, so that the same weight means the same levels.
+    pub(super) fn depends_on_weight_alone(&self) -> bool {
+        self.detail.per_step == 0.0 && self.detail.view.is_none()
+    }
+
     /// Whether a node must be replaced by its children. `moved` is how far it has moved against the other surface since the
     /// last query; `refined` tells whether it is replaced now.
     pub(super) fn refines(&self, node: &Node, moved: impl Fn() -> f64, refined: bool) -> bool {
@@ -129,6 +134,8 @@ pub(super) struct Density {
     known: bool,
     /// Vertices that the samples near the other surface stand for.
     near: f64,
+    /// The weight that holds.
+    held: f64,
 }
 
 impl Density {
@@ -145,12 +152,20 @@ impl Density {
         self.known = false;
     }
 
-    pub(super) fn weight(&self, detail: &Detail, radius: f64) -> f64 {
+    /// How many vertices a sample may stand for now. It changes only when it should be clearly another.
+    pub(super) fn weight(&mut self, detail: &Detail, radius: f64) -> f64 {
         let wanted = wanted_samples(detail, radius);
-        (self.contact / wanted).max(self.near / (NEAR_SAMPLES * wanted)).max(1.0)
+        let weight = (self.contact / wanted).max(self.near / (NEAR_SAMPLES * wanted)).max(1.0);
+        let (least, most) = (self.held / HOLDING, self.held * HOLDING);
+        if !(least..=most).contains(&weight) || (weight == 1.0 && self.held != 1.0) {
+            self.held = weight;
+        }
+        self.held
     }
 }
 
+/// A weight holds as long as the right one is within this factor.
+const HOLDING: f64 = 1.1;
 /// Of a new number of vertices in contact this share counts.
 const SMOOTHING: f64 = 0.1;
 /// Samples near the other surface are at most this many times as many as those wanted in contact.

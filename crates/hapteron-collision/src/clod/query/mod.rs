@@ -7,9 +7,11 @@
 //! depend on the level.
 
 mod front;
+mod known;
 mod least;
 mod metric;
 mod side;
+mod small;
 
 pub use metric::{Combine, Detail, View};
 
@@ -19,14 +21,21 @@ use crate::query::feature::{Feature, Foot};
 use crate::query::{QueryResult, QueryWorkspace, query};
 use crate::surface::{Surface, VertexNormal};
 use crate::vector::{Rigid, Vec3, dot, scale};
-use front::{Found, Front, Tally, walk};
+use front::{Found, Front, Tally, find};
 use least::Least;
 use metric::{Density, Judge};
 use nalgebra::{Isometry3, Vector3};
 use side::Search;
+use small::{Pace, Way};
 
 /// The first query of a pair looks this often.
 const FIRST_LOOKS: usize = 4;
+
+/// A query that takes longer than its budget makes the next ones this much more lenient, up to a limit.
+const LENIENT: f64 = 1.2;
+const MOST_LENIENT: f64 = 1e6;
+/// One that takes less than this share of it makes them stricter again.
+const SPARE: f64 = 0.6;
 
 /// A surface with its hierarchy.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +69,8 @@ pub struct LodWorkspace {
     contacts: Vec<Contact>,
     least: Least,
     leniency: f64,
+    way: Way,
+    pace: Pace,
 }
 
 /// Of the last query.
@@ -87,12 +98,11 @@ impl LodWorkspace {
     pub fn watch(&mut self, on: bool) {
         for front in &mut self.fronts {
             front.watched = on;
-            front.nodes.clear();
         }
     }
 
     /// Nodes of the fronts on body and obstacle in the last query, coarse ones before those that are taking their place; none unless
-    /// it was watched.
+    /// it was watched, and none where the contact was small or deep and so exact.
     #[must_use]
     pub fn front(&self) -> [&[u32]; 2] {
         [&self.fronts[0].nodes, &self.fronts[1].nodes]
@@ -105,6 +115,9 @@ impl LodWorkspace {
         let root = &pair.body.hierarchy.nodes[0];
         let travelled =
             known.map_or(0.0, |s| s.travelled + front::displacement(root, &s.motion, &pair.motion));
+        if let Some(known) = known {
+            self.pace.observe((travelled - known.travelled) / pair.tolerance);
+        }
         self.state = Some(State { identities, motion: pair.motion, travelled });
         if known.is_none() {
             for (front, lod) in self.fronts.iter_mut().zip([pair.body, pair.obstacle]) {
@@ -113,6 +126,8 @@ impl LodWorkspace {
             self.least.reset(pair.body.surface, pair.obstacle.surface);
             self.densities = [Density::default(); 2];
             self.leniency = 1.0;
+            self.way = Way::Levels;
+            self.pace = Pace::default();
         }
         known
     }
@@ -122,6 +137,8 @@ impl LodWorkspace {
 struct Pair<'a> {
     body: Lod<'a>,
     obstacle: Lod<'a>,
+    /// Of the mesh frames in the world.
+    poses: [&'a Isometry3<f64>; 2],
     /// From the body's mesh frame to the obstacle's, and back.
     motion: Rigid,
     inverse: Rigid,
@@ -166,7 +183,8 @@ pub fn query_levels<'a>(
     }
     let started = detail.budget_us.map(|_| std::time::Instant::now());
     let motion = Rigid::from_isometry(&relative);
-    let pair = Pair { body, obstacle, inverse: inverse(&motion), motion, tolerance };
+    let poses = [world_from_body, world_from_obstacle];
+    let pair = Pair { body, obstacle, poses, inverse: inverse(&motion), motion, tolerance };
     let eye = detail.view.map_or([[0.0; 3]; 2], |view| {
         [world_from_body, world_from_obstacle]
             .map(|pose| pose.inverse_transform_point(&view.eye).coords.into())
@@ -174,24 +192,76 @@ pub fn query_levels<'a>(
     let world = Rigid::from_isometry(world_from_obstacle);
     let known = workspace.prepare(&pair);
     let last = known.map_or(pair.motion, |s| s.motion);
-    let mut min_distance = f64::INFINITY;
-    // How large the contact is shows only when it has been looked at.
-    for _ in 0..if known.is_none() { FIRST_LOOKS } else { 1 } {
-        if known.is_none() {
-            workspace.fronts.iter_mut().for_each(Front::settle);
-            workspace.densities.iter_mut().for_each(Density::forget);
-        }
-        min_distance = workspace.find(&pair, &last, detail, eye, &world);
-    }
+    let min_distance = match (workspace.way, known.is_some()) {
+        (Way::Exact(share), true) => workspace.find_exactly(&pair, share),
+        (_, true) => workspace.find_next(&pair, &last, detail, eye, &world),
+        (_, false) => workspace.find_first(&pair, detail, eye, &world),
+    };
     if let (Some(started), Some(budget)) = (started, detail.budget_us) {
-        let late = started.elapsed().as_secs_f64() * 1e6 > budget;
-        workspace.leniency =
-            if late { workspace.leniency * 1.2 } else { (workspace.leniency / 1.05).max(1.0) };
+        let share = started.elapsed().as_secs_f64() * 1e6 / budget;
+        if share > 1.0 {
+            workspace.leniency = (workspace.leniency * LENIENT).min(MOST_LENIENT);
+        } else if share < SPARE {
+            workspace.leniency = (workspace.leniency / LENIENT).max(1.0);
+        }
     }
     QueryResult { min_distance, contacts: &workspace.contacts }
 }
 
 impl LodWorkspace {
+    /// The first query on two surfaces.
+    fn find_first(&mut self, pair: &Pair<'_>, detail: &Detail, eye: [Vec3; 2], world: &Rigid) -> f64 {
+        let mut min_distance = f64::INFINITY;
+        // How large the contact is shows only when it has been looked at.
+        for _ in 0..FIRST_LOOKS {
+            self.fronts.iter_mut().for_each(Front::settle);
+            self.densities.iter_mut().for_each(Density::forget);
+            min_distance = self.find(pair, &pair.motion, detail, eye, world);
+        }
+        self.way = Way::first(self.vertices());
+        if let Way::Exact(share) = self.way { self.find_exactly(pair, share) } else { min_distance }
+    }
+
+    /// The next query by levels.
+    fn find_next(
+        &mut self,
+        pair: &Pair<'_>,
+        last: &Rigid,
+        detail: &Detail,
+        eye: [Vec3; 2],
+        world: &Rigid,
+    ) -> f64 {
+        let min_distance = self.find(pair, last, detail, eye, world);
+        let finest = self.fronts.iter().all(Front::is_finest);
+        let pressed = -min_distance / pair.tolerance;
+        self.way = self.way.after_levels(self.vertices(), finest, self.pace, pressed);
+        min_distance
+    }
+
+    /// By the exact query.
+    fn find_exactly(&mut self, pair: &Pair<'_>, share: f32) -> f64 {
+        let [world_from_body, world_from_obstacle] = pair.poses;
+        let surfaces = [pair.body.surface, pair.obstacle.surface];
+        let [a, b] = surfaces;
+        let found = query(a, world_from_body, b, world_from_obstacle, pair.tolerance, &mut self.exact);
+        small::fade(found.contacts, surfaces, share, &mut self.contacts);
+        let pressed = -found.min_distance / pair.tolerance;
+        self.way = self.way.after_exact(found.contacts.len(), self.leniency > 1.0, self.pace, pressed);
+        self.tallies = [Tally::default(); 2];
+        self.fronts.iter_mut().for_each(|front| front.nodes.clear());
+        if self.way == Way::Levels {
+            // They begin at the finest level, where the contacts are the same.
+            self.fronts.iter_mut().for_each(Front::settle);
+            self.densities = [Density::default(); 2];
+        }
+        found.min_distance
+    }
+
+    /// Vertices that the contacts stand for.
+    fn vertices(&self) -> f64 {
+        self.contacts.iter().map(|c| c.weight).sum()
+    }
+
     /// Makes the contacts; returns the least distance.
     fn find(&mut self, pair: &Pair<'_>, last: &Rigid, detail: &Detail, eye: [Vec3; 2], world: &Rigid) -> f64 {
         let (a, b) = (pair.body.surface, pair.obstacle.surface);
@@ -203,9 +273,10 @@ impl LodWorkspace {
         let radius = pair.body.hierarchy.radius();
         let hierarchies = [pair.body.hierarchy, pair.obstacle.hierarchy];
         for (k, search) in [&of_body, &of_obstacle].into_iter().enumerate() {
-            let weight = self.densities[k].weight(detail, radius);
+            let weight =
+                if self.way == Way::Refining { 1.0 } else { self.densities[k].weight(detail, radius) };
             let judge = Judge { detail: *detail, weight, eye: eye[k], leniency: self.leniency };
-            self.tallies[k] = walk(&mut self.fronts[k], hierarchies[k], search, &judge);
+            self.tallies[k] = find(&mut self.fronts[k], hierarchies[k], search, &judge);
             self.densities[k].observe(&self.tallies[k]);
         }
         self.contacts.clear();
