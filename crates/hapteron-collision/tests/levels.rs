@@ -215,3 +215,32 @@ fn what_is_seen_or_slow_is_finer() {
     };
     assert!(moving(1) >= moving(20), "{} {}", moving(1), moving(20));
 }
+
+/// Would catch a hard push that goes through: a ball driven far into the wall of its cavity, deeper than any front looks, and back.
+#[test]
+fn a_deep_contact_is_exact() {
+    let models = ball_in_cavity(30);
+    let (tolerance, detail) = (5e-4, Detail::threshold(0.025));
+    let mut coarse = LodWorkspace::new();
+    let mut deepest: f64 = 0.0;
+    for i in 0..240 {
+        // 5 mm beyond the wall and back, 0.05 mm a query.
+        let shift = 6e-3 - 5e-5 * f64::from((120 - i32::from(i as u8)).abs());
+        let pose = Isometry3::translation(shift, 0.3 * shift, 0.1 * shift);
+        let (contacts, least) = models.levels(&pose, tolerance, &detail, &mut coarse);
+        let (wanted, exact) = models.exact(&pose, tolerance, &mut QueryWorkspace::new());
+        if exact > -0.5 * tolerance {
+            continue;
+        }
+        deepest = deepest.max(-exact);
+        let depth = contacts.iter().map(|c| c.depth).fold(0.0, f64::max);
+        // The query that finds it deep is still one by levels.
+        assert!((least - exact).abs() < 6e-5 && (depth + exact).abs() < 6e-5, "{i}: {least} {depth} {exact}");
+        let (felt, full) = (force(&contacts, tolerance), force(&wanted, tolerance));
+        assert!(
+            (felt - full).norm() < 0.1 * full.norm() || exact > -0.7 * tolerance,
+            "{i}: {felt:?} {full:?}"
+        );
+    }
+    assert!(deepest > 4e-3, "{deepest}");
+}
