@@ -64,6 +64,14 @@ struct Dive<'a> {
     which: usize,
 }
 
+impl Dive<'_> {
+    /// The weight of a contact in the middle of an edge: it begins where the edge comes through the surface, where any other contact already
+    /// presses, and must not begin with a blow.
+    fn share(&self, foot: &Foot) -> f64 {
+        (-foot.signed_distance / self.tolerance).clamp(0.0, 1.0)
+    }
+}
+
 /// Finds the vertices of the body that lie deeper in the obstacle than the tolerance, and makes their contacts.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
 pub(super) fn of_body(
@@ -78,13 +86,16 @@ pub(super) fn of_body(
     let first = sink.contacts.len();
     run(&dive, neighbours, side, memory, |inside, foot| match inside {
         Inside::Vertex(vertex, point) => push_body_vertex(pair, vertex, point, foot, sink),
-        Inside::Edge(edge, point) => sink.push(Found {
-            point_body: point,
-            point_obstacle: foot.point,
-            normal: scale(foot.normal, -1.0),
-            depth: -foot.signed_distance,
-            features: [Feature::Edge(edge), foot.feature],
-        }),
+        Inside::Edge(edge, point) => {
+            let found = Found {
+                point_body: point,
+                point_obstacle: foot.point,
+                normal: scale(foot.normal, -1.0),
+                depth: -foot.signed_distance,
+                features: [Feature::Edge(edge), foot.feature],
+            };
+            sink.push_in_part(found, dive.share(foot));
+        }
     });
     sink.sort_from(first);
 }
@@ -103,13 +114,16 @@ pub(super) fn of_obstacle(
     let first = sink.contacts.len();
     run(&dive, neighbours, side, memory, |inside, foot| match inside {
         Inside::Vertex(vertex, _) => push_obstacle_vertex(pair, vertex, foot, sink),
-        Inside::Edge(edge, point) => sink.push(Found {
-            point_body: pair.motion.point(foot.point),
-            point_obstacle: pair.motion.point(point),
-            normal: pair.motion.direction(foot.normal),
-            depth: -foot.signed_distance,
-            features: [foot.feature, Feature::Edge(edge)],
-        }),
+        Inside::Edge(edge, point) => {
+            let found = Found {
+                point_body: pair.motion.point(foot.point),
+                point_obstacle: pair.motion.point(point),
+                normal: pair.motion.direction(foot.normal),
+                depth: -foot.signed_distance,
+                features: [foot.feature, Feature::Edge(edge)],
+            };
+            sink.push_in_part(found, dive.share(foot));
+        }
     });
     sink.sort_from(first);
 }

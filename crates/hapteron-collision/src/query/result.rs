@@ -36,6 +36,12 @@ impl Sink<'_> {
 
     #[inline(always)]
     pub(super) fn push(&mut self, found: Found) {
+        self.push_in_part(found, 1.0);
+    }
+
+    /// The same for a contact that counts for less than one.
+    #[inline(always)]
+    pub(super) fn push_in_part(&mut self, found: Found, weight: f64) {
         self.least = self.least.min(-found.depth);
         let point_body = self.world_from_obstacle.point(found.point_body);
         let point_obstacle = self.world_from_obstacle.point(found.point_obstacle);
@@ -45,7 +51,7 @@ impl Sink<'_> {
             point_obstacle: Vector3::from(point_obstacle),
             normal: Vector3::from(normal),
             depth: found.depth,
-            weight: 1.0,
+            weight,
             body_feature: found.features[0].number(self.pair.body),
             obstacle_feature: found.features[1].number(self.pair.obstacle),
         });
