@@ -88,7 +88,7 @@ pub(super) fn fade(found: &[Contact], surfaces: [&Surface; 2], share: f32, conta
     contacts.clear();
     contacts.extend(found.iter().filter_map(|c| {
         let edges = is_edge(c.body_feature, surfaces[0]) && is_edge(c.obstacle_feature, surfaces[1]);
-        let weight = if edges { f64::from(share) } else { 1.0 };
+        let weight = c.weight * if edges { f64::from(share) } else { 1.0 };
         (weight > 0.0).then_some(Contact { weight, ..*c })
     }));
 }
