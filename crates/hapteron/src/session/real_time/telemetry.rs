@@ -72,7 +72,7 @@ pub(super) fn add(count: &AtomicU64, n: u64) {
     count.store(count.load(Ordering::Relaxed) + n, Ordering::Relaxed);
 }
 
-/// A look at [`Telemetry`].
+/// A look at the telemetry of a session.
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
     /// From the start of one tick to the start of the next.
