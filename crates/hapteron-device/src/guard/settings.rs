@@ -12,6 +12,8 @@ const FULL_SLEW: f64 = 0.005;
 const FULL_POWER_SPEED: f64 = 1.0;
 /// Damping of the passivity controller at the most, N s/m: beyond it encoder noise is felt.
 const MOST_DAMPING: f64 = 5.0;
+/// Where a limit is to limit nothing, in any unit.
+const NO_LIMIT: f64 = 1e9;
 /// Swings of the force of this share of the greatest count as oscillation, when they feed the hand.
 const OSCILLATION_SHARE: f64 = 0.1;
 
@@ -103,6 +105,23 @@ impl GuardSettings {
             delay: 0,
             passivity: false,
             max_damping: MOST_DAMPING,
+        }
+    }
+
+    /// What stays of it where it is switched off on a device with motors: finite numbers, the greatest force and torque, ramps, and fading when
+    /// contacts or samples are stale. Slew, power, speed, oscillation and passivity are no longer looked at.
+    #[must_use]
+    pub fn limits_only(self) -> Self {
+        Self {
+            max_slew: NO_LIMIT,
+            max_torque_slew: NO_LIMIT,
+            max_power: NO_LIMIT,
+            max_speed: NO_LIMIT,
+            max_angular_speed: NO_LIMIT,
+            oscillation_force: NO_LIMIT,
+            oscillation_torque: NO_LIMIT,
+            passivity: false,
+            ..self
         }
     }
 

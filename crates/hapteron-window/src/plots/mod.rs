@@ -232,14 +232,19 @@ fn bare_plot(graph: Graph) -> Plot<'static> {
         .y_axis_min_width(34.0)
         .x_axis_formatter(|mark: GridMark, _| format!("{} s", short(mark.value)))
         .y_axis_formatter(|mark: GridMark, _| short(mark.value))
-        .x_grid_spacer(seconds)
+        .x_grid_spacer(|input| marks(input.bounds))
+        .y_grid_spacer(|input| marks(input.bounds))
 }
 
-/// Grid lines at whole steps of time, few enough that their numbers have room.
-fn seconds(input: egui_plot::GridInput) -> Vec<GridMark> {
-    let (low, high) = input.bounds;
-    let step = [0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0].into_iter().find(|s| (high - low) / s <= 4.0);
-    let step = step.unwrap_or(100.0);
+/// Grid lines at round steps, few enough that their numbers have room, and at least two however great a peak is.
+fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
+    let span = high - low;
+    if !(span > 0.0 && span.is_finite()) {
+        return Vec::new();
+    }
+    let ten = 10.0_f64.powf((span / 4.0).log10().floor());
+    let step =
+        [1.0, 2.0, 5.0, 10.0].map(|n| n * ten).into_iter().find(|s| span / s <= 4.0).unwrap_or(10.0 * ten);
     let range = (low / step).ceil() as i64..=(high / step).floor() as i64;
     range.map(|n| GridMark { value: n as f64 * step, step_size: step }).collect()
 }
@@ -347,6 +352,20 @@ mod tests {
         assert!(low <= 0.0 && high >= 0.5);
         let [low, high] = span([[0.0, -0.4], [1.0, 3.0]].iter(), Graph::Penetration);
         assert!(low < -0.4 && high > 3.0);
+    }
+
+    /// Would catch an axis that loses its numbers when a peak widens it, or is full of them.
+    #[test]
+    fn every_axis_has_a_few_round_marks() {
+        for exponent in -30..30 {
+            for mantissa in [1.0, 1.9, 2.0, 3.3, 5.0, 7.7, 9.99] {
+                let high = mantissa * 10.0_f64.powi(exponent) / 7.0;
+                let marks = marks((-0.02 * high, 1.06 * high));
+                assert!((2..=5).contains(&marks.len()), "{high}: {}", marks.len());
+                assert!(marks.iter().all(|m| m.value >= -0.02 * high && m.value <= 1.06 * high));
+            }
+        }
+        assert!(marks((1.0, 1.0)).is_empty() && marks((0.0, f64::NAN)).is_empty());
     }
 
     #[test]

@@ -134,13 +134,23 @@ impl Resolver<'_> {
         time_step: f64,
     ) -> Resolved<Option<GuardSettings>> {
         let enabled = *keys.enabled.get_or_insert(real || hand);
-        let settings = guard_settings(keys, &simulated.model.capabilities(), simulated.delay, time_step);
+        let settings =
+            guard_settings(keys, &simulated.model.capabilities(), !real, simulated.delay, time_step);
         Guard::new(settings).map_err(|e| self.source.fault(&format!("guard.{}", e.0), e.to_string()))?;
         if !real {
             // Of a real device only the device itself knows the limits.
             write_out(keys, &settings);
         }
-        Ok(enabled.then_some(settings))
+        Ok(as_wanted(settings, enabled, real))
+    }
+}
+
+/// A guard that is switched off is gone where the motors are simulated; of a real device its limits stay.
+pub(super) fn as_wanted(settings: GuardSettings, enabled: bool, real: bool) -> Option<GuardSettings> {
+    match (enabled, real) {
+        (true, _) => Some(settings),
+        (false, true) => Some(settings.limits_only()),
+        (false, false) => None,
     }
 }
 
@@ -156,16 +166,24 @@ pub(super) fn write_out(keys: &mut file::Guard, settings: &GuardSettings) {
     keys.passivity = Some(settings.passivity);
 }
 
-/// The limits for a device: the scene's where it has them, else the device's.
+/// The limits for a device: the scene's where it has them, else the device's; of force and torque no more than the device's, where it
+/// is there (`known`) and tells. So a scene that was made for a strong device does no harm on a weak one.
 pub(super) fn guard_settings(
     keys: &file::Guard,
     device: &Capabilities,
+    known: bool,
     delay: usize,
     time_step: f64,
 ) -> GuardSettings {
     let of_device = GuardSettings::for_device(device, time_step);
-    let max_force = keys.max_force.unwrap_or(of_device.max_force);
-    let max_torque = keys.max_torque.unwrap_or(of_device.max_torque);
+    let least = |key: Option<f64>, drives: bool, peak: f64, usual: f64| match key {
+        None => usual,
+        Some(limit) if known && !drives => limit.min(0.0),
+        Some(limit) if known && peak.is_finite() => limit.min(peak),
+        Some(limit) => limit,
+    };
+    let max_force = least(keys.max_force, device.drives_force, device.peak_force, of_device.max_force);
+    let max_torque = least(keys.max_torque, device.drives_torque, device.peak_torque, of_device.max_torque);
     let usual = GuardSettings {
         max_damping: of_device.max_damping,
         ..GuardSettings::within(max_force, max_torque, time_step)

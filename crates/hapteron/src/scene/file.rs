@@ -291,11 +291,12 @@ pub enum Grip {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Guard {
-    /// Default true where a device or a simulated hand feels the force.
+    /// Default true where a device or a simulated hand feels the force. Of a real device the limits of force and torque, the ramps and
+    /// the fading stay even when it is false.
     pub enabled: Option<bool>,
-    /// N; default the device's peak.
+    /// N; default the device's peak, which is also the most.
     pub max_force: Option<f64>,
-    /// N m; default the device's peak.
+    /// N m; default the device's peak, which is also the most.
     pub max_torque: Option<f64>,
     /// N/s; default the greatest force in 5 ms. The torque follows in proportion.
     pub max_slew: Option<f64>,

@@ -190,7 +190,8 @@ impl Scene {
         self.trajectory.duration()
     }
 
-    /// A guard for a device, with the scene's limits where it has them; none: switched off.
+    /// A guard for a device, with the scene's limits where it has them, and never more than the device's. None: switched off, and the
+    /// device is simulated; of a real one the limits stay ([`GuardSettings::limits_only`]).
     ///
     /// # Errors
     /// A limit out of its range.
@@ -201,17 +202,12 @@ impl Scene {
             key: Some(format!("guard.{}", e.0)),
             problem: e.to_string(),
         };
-        if self.file.guard.enabled == Some(false) {
-            return Ok(None);
-        }
-        Guard::new(closed_loop::guard_settings(
-            &self.file.guard,
-            device,
-            self.simulated.delay,
-            self.time_step,
-        ))
-        .map(Some)
-        .map_err(fault)
+        let (keys, delay) = (&self.file.guard, self.simulated.delay);
+        let settings = closed_loop::guard_settings(keys, device, true, delay, self.time_step);
+        Guard::new(settings).map_err(fault)?;
+        let real = self.file.device.kind.as_deref().is_some_and(|kind| kind != closed_loop::SIMULATED);
+        let settings = closed_loop::as_wanted(settings, keys.enabled != Some(false), real);
+        settings.map(Guard::new).transpose().map_err(fault)
     }
 
     /// Takes the limits of a device that is open into the scene, for its guard and for [`Scene::to_toml`].

@@ -134,6 +134,27 @@ fn a_hand_gets_a_guard_with_its_device_s_limits() {
     assert_eq!(real.guard_for(&device).unwrap().unwrap().settings().max_force, 12.0);
 }
 
+/// Would catch a scene file that pushes a hand with more than its device is made for, or takes a real device's limits away.
+#[test]
+fn no_scene_takes_a_device_s_limits_away() {
+    let device = hapteron_device::simulated::model("sigma.7").unwrap().capabilities();
+    let greedy = with("device/kind = \"forcedimension\"") + "[guard]\nmax_force = 500.0\nmax_torque = 90.0\n";
+    let limits = |text: &str| {
+        let mut scene = parse(text).unwrap();
+        scene.adopt(&device).unwrap();
+        // What is written out makes the same guard again where the device is not there.
+        assert_eq!(parse(&scene.to_toml().unwrap()).unwrap().guard, scene.guard);
+        scene.guard.unwrap()
+    };
+    let on = limits(&greedy);
+    assert_eq!((on.max_force, on.max_torque), (device.peak_force, device.peak_torque));
+    let off = limits(&(greedy.clone() + "enabled = false\n"));
+    assert_eq!((off.max_force, off.max_torque, off.ramp_time), (on.max_force, on.max_torque, on.ramp_time));
+    assert!(off.max_slew > 1e6 && off.oscillation_force > 1e6);
+    let simulated = greedy.replace("forcedimension", "simulated") + "enabled = true\n";
+    assert_eq!(parse(&simulated).unwrap().guard.unwrap().max_force, 8.5);
+}
+
 /// Would catch buttons or a priority that cannot be, and a priority above the haptic thread's.
 #[test]
 fn buttons_and_priorities_are_checked() {
