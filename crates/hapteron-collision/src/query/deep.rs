@@ -49,6 +49,8 @@ struct Probe {
     edge: u32,
     start: Vec3,
     along: Vec3,
+    /// The part of it, as shares, beyond what its ends know to be empty.
+    part: [f64; 2],
 }
 
 /// One surface in the other one.
@@ -207,12 +209,12 @@ fn long_edges(dive: &Dive<'_>, leaf: u32, side: &Side, memory: &mut Memory) -> f
         if lane == 0 {
             memory.segments.push(SegmentBlock::EMPTY);
         }
+        let part = [empty[0] * inverse, 1.0 - empty[1] * inverse];
         if let Some(block) = memory.segments.last_mut() {
-            let ends = [empty[0] * inverse, 1.0 - empty[1] * inverse]
-                .map(|share| add(start, scale(along, share)).map(|c| c as f32));
+            let ends = part.map(|share| add(start, scale(along, share)).map(|c| c as f32));
             block.set(lane, ends, f32::MIN_POSITIVE);
         }
-        memory.probes.push(Probe { edge, start, along });
+        memory.probes.push(Probe { edge, start, along, part });
     }
     spare
 }
@@ -246,7 +248,7 @@ fn cross_leaves(dive: &Dive<'_>, near: &[u32], memory: &mut Memory) -> f32 {
 fn cross_leaf(dive: &Dive<'_>, probe: &Probe, index: u32, found: &mut Vec<(u32, f64)>) {
     let (leaf, block) = (&dive.other.leaves[index as usize], &dive.other.blocks[index as usize]);
     let from = sub(probe.start, block.origin.map(f64::from));
-    let ends = [from, add(from, probe.along)].map(|p| p.map(|c| c as f32));
+    let ends = probe.part.map(|share| add(from, scale(probe.along, share)).map(|c| c as f32));
     let mut mask = kernel::pierced_triangles(ends, block) & ((1 << leaf.triangles) - 1);
     while mask != 0 {
         let triangle = leaf.first_triangle + mask.trailing_zeros();

@@ -191,6 +191,9 @@ pub(super) fn pierced_triangles([p, q]: [[f32; 3]; 2], b: &TriangleBlock) -> u32
     };
     let (z, to_z) = (part(&b.normal, &from), part(&b.normal, &to));
     let apart = z.fast_min(to_z).simd_gt(error) | z.fast_max(to_z).simd_lt(-error);
+    if apart.all() {
+        return 0;
+    }
     let (x, y) = (part(&b.along, &from), part(&b.across, &from));
     let (dx, dy, dz) = (part(&b.along, &to) - x, part(&b.across, &to) - y, to_z - z);
     // Where the segment is almost in the plane the share of it is uncertain, and infinite or not a number in it.

@@ -15,11 +15,21 @@ const ERROR: f32 = 3e-6;
 pub(super) struct SegmentBlock {
     ends: [[[f32; LANES]; 3]; 2],
     within: [f32; LANES],
+    /// Normal cones.
+    normal: [[f32; LANES]; 3],
+    cos: [f32; LANES],
+    sin: [f32; LANES],
 }
 
 impl SegmentBlock {
     /// Lanes that are near nothing.
-    pub(super) const EMPTY: Self = Self { ends: [[[f32::INFINITY; LANES]; 3]; 2], within: [0.0; LANES] };
+    pub(super) const EMPTY: Self = Self {
+        ends: [[[f32::INFINITY; LANES]; 3]; 2],
+        within: [0.0; LANES],
+        normal: [[0.0; LANES]; 3],
+        cos: [-1.0; LANES],
+        sin: [0.0; LANES],
+    };
 
     #[inline(always)]
     pub(super) fn set(&mut self, lane: usize, ends: [[f32; 3]; 2], within: f32) {
@@ -28,6 +38,20 @@ impl SegmentBlock {
             self.ends[1][axis][lane] = ends[1][axis];
         }
         self.within[lane] = within;
+    }
+
+    #[inline(always)]
+    pub(super) fn set_cone(&mut self, lane: usize, cone: &Cone) {
+        for axis in 0..3 {
+            self.normal[axis][lane] = cone.axis[axis];
+        }
+        (self.cos[lane], self.sin[lane]) = (cone.cos, cone.sin);
+    }
+
+    /// Which edges may touch something with a normal in this cone.
+    #[inline(always)]
+    pub(super) fn facing(&self, cone: &Cone) -> u32 {
+        facing([&self.cos, &self.sin], &self.normal, cone, cone.axis.map(f32x8::splat)).to_bitmask()
     }
 
     /// Two masks: of the edges that may be as close to a leaf as they need to be, and of those that may meet its bounds; and a
@@ -135,7 +159,9 @@ impl RidgeBlock {
         let least = (h.abs() - h_error).fast_max(f32x8::ZERO);
         let whole = whole + area * area * ERROR;
         let short = (least * least).simd_le(limit * limit * whole * (1.0 + 1e-5));
-        let mask = (self.facing(cone, n) & short & limit.simd_gt(f32x8::ZERO)).to_bitmask();
+        let mask =
+            (facing([&self.cos, &self.sin], &self.normal, cone, n) & short & limit.simd_gt(f32x8::ZERO))
+                .to_bitmask();
         if mask == 0 {
             return 0;
         }
@@ -151,14 +177,14 @@ impl RidgeBlock {
             & t.simd_lt(whole + t_error);
         between.to_bitmask() & mask
     }
+}
 
-    /// [`Cone::faces`] for eight cones; `n` is the axis of this one.
-    #[inline(always)]
-    fn facing(&self, cone: &Cone, n: [f32x8; 3]) -> f32x8 {
-        let aligned = dot(n, self.normal.map(lanes));
-        let (cos, sin) = (lanes(self.cos), lanes(self.sin));
-        (cos + cone.cos).simd_le(f32x8::ZERO) | aligned.simd_le(sin * cone.sin - cos * cone.cos + Cone::SLACK)
-    }
+/// [`Cone::faces`] for eight cones, given by cosines and sines and axes; `n` is the axis of the single one.
+#[inline(always)]
+fn facing([cos, sin]: [&[f32; LANES]; 2], axes: &[[f32; LANES]; 3], cone: &Cone, n: [f32x8; 3]) -> f32x8 {
+    let aligned = dot(n, axes.map(lanes));
+    let (cos, sin) = (lanes(*cos), lanes(*sin));
+    (cos + cone.cos).simd_le(f32x8::ZERO) | aligned.simd_le(sin * cone.sin - cos * cone.cos + Cone::SLACK)
 }
 
 #[inline(always)]

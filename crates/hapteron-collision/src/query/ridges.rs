@@ -72,6 +72,7 @@ impl Ridges {
             }
             if let Some(block) = self.segments.last_mut() {
                 block.set(lane, [a, b].map(|p| p.map(|c| c as f32)), (within as f32).next_up());
+                block.set_cone(lane, &cone);
             }
             self.own.push(Ridge { start: a, along: sub(b, a), outward, within, cone, index });
         }
@@ -169,7 +170,11 @@ pub(super) fn find(
             for eight in 0..ridges.segments.len() {
                 let (mut mask, meeting, apart) = ridges.segments[eight].near(theirs, slack);
                 lower = if apart < lower { apart } else { lower };
-                mask = if facing { mask } else { 0 };
+                mask = if facing && mask != 0 {
+                    mask & ridges.segments[eight].facing(&theirs.ridge_cone)
+                } else {
+                    0
+                };
                 while mask != 0 {
                     let lane = mask.trailing_zeros() as usize;
                     mask &= mask - 1;

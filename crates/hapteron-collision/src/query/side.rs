@@ -11,6 +11,8 @@ pub(super) struct Side {
     /// By page of vertices: where its results are, plus one; zero when none of its vertices has any.
     pages: Vec<u32>,
     results: Vec<Page>,
+    /// One bit a vertex: whether it has a signed distance now. Most that are asked for have none, and this fits the nearest cache.
+    known: Vec<u64>,
     /// Vertices with a signed distance, in the order found.
     found: Vec<u32>,
     /// By neighbourhood of the last walk.
@@ -39,7 +41,7 @@ impl Clear {
 
 #[derive(Clone, Debug)]
 struct Page {
-    /// Signed distance to the other surface, infinite when farther than the tolerance.
+    /// Signed distance to the other surface, where one is known.
     signed: [f64; PAGE],
     /// The leaf of the other surface that was closest in the last query, plus one.
     last: [u32; PAGE],
@@ -52,14 +54,14 @@ impl Side {
         self.results.clear();
         self.pages.clear();
         self.pages.resize(surface.vertices.len().div_ceil(PAGE), 0);
+        self.known.clear();
+        self.known.resize(self.pages.len(), 0);
     }
 
     /// Forgets the distances of the last query, at a cost in proportion to what it found.
     pub(super) fn clear(&mut self) {
         for &vertex in &self.found {
-            if let Some(page) = self.pages[vertex as usize / PAGE].checked_sub(1) {
-                self.results[page as usize].signed[vertex as usize % PAGE] = f64::INFINITY;
-            }
+            self.known[vertex as usize / PAGE] = 0;
         }
         self.found.clear();
     }
@@ -78,6 +80,9 @@ impl Side {
     /// Signed distance of a vertex to the other surface, infinite when farther than the tolerance.
     #[inline(always)]
     pub(super) fn signed_distance(&self, vertex: u32) -> f64 {
+        if self.known[vertex as usize / PAGE] >> (vertex as usize % PAGE) & 1 == 0 {
+            return f64::INFINITY;
+        }
         self.page(vertex).map_or(f64::INFINITY, |page| page.signed[vertex as usize % PAGE])
     }
 
@@ -98,6 +103,7 @@ impl Side {
         let page = &mut self.results[*place as usize - 1];
         page.signed[vertex as usize % PAGE] = signed_distance;
         page.last[vertex as usize % PAGE] = leaf + 1;
+        self.known[vertex as usize / PAGE] |= 1 << (vertex as usize % PAGE);
         self.found.push(vertex);
     }
 }
