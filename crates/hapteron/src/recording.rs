@@ -1,5 +1,12 @@
 //! Recordings of runs: one row a tick, as `run.csv`, and what they come to.
 
+mod rows;
+mod summary;
+
+pub use rows::Rows;
+pub(crate) use rows::whole_lines;
+pub use summary::{Summarizer, Summary};
+
 use crate::scene::Scene;
 use crate::session::{ContactSnapshot, Flags, Tick};
 use hapteron_dynamics::RigidBody;
@@ -131,6 +138,17 @@ impl Row {
         }
     }
 
+    /// Writes its line of `run.csv`; the numbers read back to the same bits.
+    ///
+    /// # Errors
+    /// Those of the output.
+    pub fn write_csv(&self, output: &mut impl Write) -> io::Result<()> {
+        for (i, number) in self.numbers().iter().enumerate() {
+            write!(output, "{}{number}", if i == 0 { "" } else { "," })?;
+        }
+        writeln!(output, ",{},{},{},{}", self.contacts, self.clusters, self.contact_age, self.flags.bits())
+    }
+
     fn numbers(&self) -> [f64; 41] {
         let mut numbers = [0.0; 41];
         let mut at = 0;
@@ -177,6 +195,14 @@ impl Row {
     }
 }
 
+/// Writes the first line of `run.csv`.
+///
+/// # Errors
+/// Those of the output.
+pub fn write_header(output: &mut impl Write) -> io::Result<()> {
+    writeln!(output, "{}", COLUMNS.join(","))
+}
+
 /// A run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
@@ -188,35 +214,6 @@ pub struct Recording {
     pub fault_time: Option<f64>,
     /// Whether the run was ended before its motion was.
     pub cancelled: bool,
-}
-
-/// What a recording comes to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Summary {
-    /// Seconds.
-    pub duration: f64,
-    /// No fault, deviation below [`GREATEST_DEVIATION`], angle below [`GREATEST_ANGLE`].
-    pub stable: bool,
-    /// Of the coupling, metres.
-    pub greatest_deviation: f64,
-    /// Of the coupling, radians.
-    pub greatest_angle: f64,
-    /// Of the feedback, N.
-    pub greatest_force: f64,
-    /// Of the feedback, N m.
-    pub greatest_torque: f64,
-    /// Metres; not positive when the surfaces never crossed.
-    pub greatest_penetration: f64,
-    /// Share of the ticks with a contact force.
-    pub in_contact: f64,
-    /// Most contacts of a query.
-    pub most_contacts: u32,
-    /// Most planes at once.
-    pub most_planes: u32,
-    /// Seconds.
-    pub greatest_contact_age: f64,
-    /// Root mean square of the feedback force's step from tick to tick, N, in contact.
-    pub force_roughness: f64,
 }
 
 impl Recording {
@@ -240,33 +237,9 @@ impl Recording {
     /// What it comes to.
     #[must_use]
     pub fn summary(&self) -> Summary {
-        let norm = |v: &Vector3<f64>| libm::sqrt(v.norm_squared());
-        let greatest = |value: &dyn Fn(&Row) -> f64| self.rows.iter().map(value).fold(0.0, f64::max);
-        let touching = |r: &Row| norm(&r.contact[0]) > 0.0;
-        let steps: Vec<f64> = self
-            .rows
-            .windows(2)
-            .filter(|w| touching(&w[0]) && touching(&w[1]))
-            .map(|w| (w[1].feedback[0] - w[0].feedback[0]).norm_squared())
-            .collect();
-        let greatest_deviation = greatest(&|r| r.deviation);
-        Summary {
-            duration: self.rows.last().map_or(0.0, |r| r.time),
-            stable: self.fault_time.is_none()
-                && greatest_deviation < GREATEST_DEVIATION
-                && self.greatest_angle < GREATEST_ANGLE,
-            greatest_deviation,
-            greatest_angle: self.greatest_angle,
-            greatest_force: greatest(&|r| norm(&r.feedback[0])),
-            greatest_torque: greatest(&|r| norm(&r.feedback[1])),
-            greatest_penetration: self.rows.iter().map(|r| r.penetration).fold(f64::NEG_INFINITY, f64::max),
-            in_contact: self.rows.iter().filter(|r| touching(r)).count() as f64
-                / self.rows.len().max(1) as f64,
-            most_contacts: self.rows.iter().map(|r| r.contacts).max().unwrap_or(0),
-            most_planes: self.rows.iter().map(|r| r.clusters).max().unwrap_or(0),
-            greatest_contact_age: greatest(&|r| r.contact_age),
-            force_roughness: libm::sqrt(steps.iter().sum::<f64>() / steps.len().max(1) as f64),
-        }
+        let mut summary = Summarizer::default();
+        self.rows.iter().for_each(|row| summary.push(row));
+        summary.summary(self.greatest_angle)
     }
 
     /// Writes `run.csv`; the numbers read back to the same bits.
@@ -275,48 +248,25 @@ impl Recording {
     /// Those of the file.
     pub fn write_csv(&self, output: impl Write) -> io::Result<()> {
         let mut output = io::BufWriter::new(output);
-        writeln!(output, "{}", COLUMNS.join(","))?;
+        write_header(&mut output)?;
         for row in &self.rows {
-            for (i, number) in row.numbers().iter().enumerate() {
-                write!(output, "{}{number}", if i == 0 { "" } else { "," })?;
-            }
-            writeln!(output, ",{},{},{},{}", row.contacts, row.clusters, row.contact_age, row.flags.bits())?;
+            row.write_csv(&mut output)?;
         }
         output.flush()
     }
 
-    /// Reads `run.csv`. The greatest angle is not a column; it is zero.
+    /// Reads `run.csv`. The greatest angle is not a column; it is zero. A last line that was cut off, as by a crash, is left out.
     ///
     /// # Errors
     /// [`RecordingError`] with file, line and cure.
     pub fn read_csv(bytes: &[u8], name: &str) -> Result<Self, RecordingError> {
-        let fail =
-            |line: Option<u64>, problem: String| RecordingError { file: name.to_owned(), line, problem };
-        let mut reader = csv::Reader::from_reader(bytes);
-        let header = reader.headers().map_err(|e| fail(None, e.to_string()))?.clone();
-        let mut places = [0; 45];
-        for (place, column) in places.iter_mut().zip(COLUMNS) {
-            *place = header.iter().position(|h| h == column).ok_or_else(|| {
-                fail(Some(1), format!("column '{column}' is missing; this is not a run.csv of hapteron"))
-            })?;
-        }
         let mut recording = Self::new();
-        for record in reader.records() {
-            let record = record.map_err(|e| fail(e.position().map(csv::Position::line), e.to_string()))?;
-            let line = record.position().map(csv::Position::line);
-            let mut numbers = [0.0; 45];
-            for ((number, &place), column) in numbers.iter_mut().zip(&places).zip(COLUMNS) {
-                let word = record.get(place).unwrap_or_default();
-                *number = word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| {
-                    let shown: String = word.chars().take(40).collect();
-                    fail(line, format!("'{shown}' in column '{column}' is not a finite number"))
-                })?;
-            }
-            let row = Row::from_numbers(&numbers);
-            recording.add(row);
+        for row in Rows::new(whole_lines(bytes), name)? {
+            recording.add(row?);
         }
         if recording.rows.is_empty() {
-            return Err(fail(None, "there are no rows".to_owned()));
+            let problem = "there are no rows".to_owned();
+            return Err(RecordingError { file: name.to_owned(), line: None, problem });
         }
         Ok(recording)
     }

@@ -4,13 +4,12 @@ use super::faults::{Fault, Watch};
 use super::run::{begin, finish};
 use crate::arguments::OnFault;
 use crate::progress;
-use crate::report::{self, Live, Outcome, Time};
+use crate::report::{self, Digest, Live, Outcome, Time};
 use anyhow::{Context, Result, bail};
 use hapteron::device::{Device, drivers};
 use hapteron::scene::Scene;
 use hapteron::session::real_time::{
-    Finished, PassRecord, RealTime, RealTimeOptions, Recorded, Recorder, Running, SceneDevice, TickRecord,
-    Told,
+    Finished, PassRecord, RealTime, RealTimeOptions, Running, SceneDevice, Spool, Spooled, TickRecord, Told,
 };
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -59,63 +58,88 @@ pub fn run_into(mut scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode
     };
     let name = device.capabilities().name.clone();
     let options = RealTimeOptions { duration, bare: plan.bare, attach, ..RealTimeOptions::of(&scene) };
+    // Before the motors are on: what cannot be recorded is known now.
+    let spool = Spool::create(Arc::clone(&scene), folder)?;
     let running = RealTime::start(Arc::clone(&scene), device, options)?;
     eprintln!("haptic thread: {}; memory {}", running.grants().priority, running.grants().memory);
-    let (finished, recorded, faults) = follow(running, Arc::clone(&scene), Watch::new(plan.on_fault))?;
-    let Recorded { mut recording, log, timing } = recorded;
-    if recording.rows.is_empty() {
+    let (finished, spooled, faults) = follow(running, spool, Watch::new(plan.on_fault))?;
+    if finished.timing.ticks == 0 {
         bail!("the session ended before its first tick: {}", finished.end);
     }
     // Without a duration Ctrl-C is the way to end it.
-    recording.cancelled = progress::interrupted() && duration.is_some();
-    let path = folder.join("device.csv");
-    let file = std::fs::File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
-    log.write_csv(file).with_context(|| format!("cannot write {}", path.display()))?;
+    let cancelled = progress::interrupted() && duration.is_some();
+    let (digest, trouble) = settle(&spooled, cancelled);
     let live = Live {
         end: finished.end.clone(),
         grants: finished.grants,
         timing: finished.timing,
-        ticks: timing,
+        unrecorded: spooled.lost(),
+        trouble: trouble.clone(),
         device: name,
         faults,
+    };
+    let force_lost = match live.faults.last() {
+        Some(Fault { time, reason, rearmed: None }) => Some((*time, reason.clone())),
+        _ => None,
     };
     let path = folder.join("timing.json");
     let text = serde_json::to_string_pretty(&report::timing_json(&live))?;
     std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
-    let outcome = Outcome { scene: &scene, recording: &recording, time: Time::Real(Box::new(live)) };
-    let code = finish(&outcome, duration.unwrap_or_default(), &notes, folder)?;
+    let outcome = Outcome { scene: &scene, digest, time: Time::Real(Box::new(live)) };
+    let code = finish(outcome, duration.unwrap_or_default(), &notes, folder)?;
     if !finished.end.is_regular() {
         bail!("the session ended early: {}", finished.end);
     }
-    if let Time::Real(live) = &outcome.time
-        && let Some(Fault { time, reason, rearmed: None }) = live.faults.last()
-    {
+    if let Some((time, reason)) = force_lost {
         bail!("there was no force from {time:.3} s on: {reason}");
     }
-    Ok(code)
+    match trouble {
+        Some(trouble) => bail!("{trouble}"),
+        None => Ok(code),
+    }
+}
+
+/// Reads the recording once more, for the depths that are not known yet and for the report. Answers what is wrong with it, too.
+fn settle(spooled: &Spooled, cancelled: bool) -> (Digest, Option<String>) {
+    let bar = progress::bar(1000, "measuring depths");
+    let mut digest = Digest::expecting(usize::try_from(spooled.rows()).unwrap_or(usize::MAX));
+    let mut told = |share: f64| {
+        bar.set_position((share * 1000.0) as u64);
+        true
+    };
+    let settled = spooled.settle(&mut told, &mut |row, timing| digest.push(row, timing));
+    bar.finish_and_clear();
+    (digest.greatest_angle, digest.cancelled) = (spooled.greatest_angle(), cancelled);
+    let trouble = spooled.trouble().map(str::to_owned);
+    (digest, trouble.or(settled.err().map(|e| e.to_string())))
 }
 
 /// Watches a session to its end, with a live line.
 fn follow(
     mut running: Running,
-    scene: Arc<Scene>,
+    mut spool: Spool,
     mut watch: Watch,
-) -> Result<(Finished, Recorded, Vec<Fault>)> {
-    let mut recorder = Recorder::new(scene);
+) -> Result<(Finished, Spooled, Vec<Fault>)> {
     let mut line = LiveLine::new();
+    let mut in_trouble = false;
     while !running.is_over() && !progress::interrupted() {
         std::thread::sleep(LOOK);
         running.drain(&mut |told| match told {
             Told::Tick(tick) => {
                 watch.tick(tick);
                 line.tick(tick);
-                recorder.tick(tick);
+                spool.tick(tick);
             }
             Told::Pass(pass) => {
                 line.pass(pass);
-                recorder.pass(pass);
+                spool.pass(pass);
             }
         });
+        // A full disk is no reason to take the force out of a hand.
+        if let (Some(trouble), false) = (spool.trouble(), in_trouble) {
+            eprintln!("\n{trouble}; the session goes on");
+            in_trouble = true;
+        }
         if watch.react(&mut running) {
             break;
         }
@@ -123,18 +147,9 @@ fn follow(
     }
     let finished = running.stop();
     line.end()?;
-    for record in &finished.records {
-        watch.tick(record);
-        recorder.tick(record);
-    }
-    finished.passes.iter().for_each(|p| recorder.pass(p));
-    let bar = progress::bar(1000, "measuring depths");
-    let recorded = recorder.finish(&mut |share| {
-        bar.set_position((share * 1000.0) as u64);
-        true
-    });
-    bar.finish_and_clear();
-    Ok((finished, recorded, watch.into_faults()))
+    finished.records.iter().for_each(|record| watch.tick(record));
+    let spooled = spool.finish(&finished.records, &finished.passes);
+    Ok((finished, spooled, watch.into_faults()))
 }
 
 /// What happens, every half a second, on a terminal.
@@ -235,6 +250,9 @@ pub fn print_timing(out: &mut impl Write, live: &Live) -> std::io::Result<()> {
     )?;
     if let Some(text) = report::left_out(live) {
         writeln!(out, "  {text}")?;
+    }
+    if report::records_lost(live) > 0 {
+        writeln!(out, "  {} records were lost: this run cannot be made again", report::records_lost(live))?;
     }
     for fault in &live.faults {
         let since = fault.rearmed.map_or_else(|| "the end".to_owned(), |t| format!("{t:.3} s"));

@@ -3,7 +3,7 @@
 use super::real_time::{self, Plan};
 use crate::arguments::Run;
 use crate::progress;
-use crate::report::{self, Outcome, Time};
+use crate::report::{self, Digest, Outcome, Time};
 use anyhow::{Context, Result, bail};
 use hapteron::recording::{Recording, Summary};
 use hapteron::scene::{Changes, Scene};
@@ -76,8 +76,9 @@ pub fn run_into(scene: &Scene, duration: Option<f64>, folder: &Path) -> Result<E
     let started = Instant::now();
     let recording = record(scene, scene.name(), duration)?;
     let wall = started.elapsed().as_secs_f64();
-    let outcome = Outcome { scene, recording: &recording, time: Time::Virtual { wall, replayed: false } };
-    finish(&outcome, duration, &notes, folder)
+    let time = Time::Virtual { wall, replayed: false };
+    write_recording(&recording, folder)?;
+    finish(Outcome { scene, digest: Digest::of(&recording), time }, duration, &notes, folder)
 }
 
 /// Makes the ticks of a session's log again and writes the run folder.
@@ -93,8 +94,10 @@ fn replay_into(scene: &Scene, path: &Path, folder: &Path) -> Result<ExitCode> {
     })?;
     bar.finish_and_clear();
     let wall = started.elapsed().as_secs_f64();
-    let outcome = Outcome { scene, recording: &recording, time: Time::Virtual { wall, replayed: true } };
-    finish(&outcome, log.rows.last().map_or(0.0, |r| r.time), &notes, folder)
+    let time = Time::Virtual { wall, replayed: true };
+    write_recording(&recording, folder)?;
+    let outcome = Outcome { scene, digest: Digest::of(&recording), time };
+    finish(outcome, log.rows.last().map_or(0.0, |r| r.time), &notes, folder)
 }
 
 /// Makes the folder, and tells what a user should know of the scene.
@@ -109,18 +112,24 @@ pub fn begin(scene: &Scene, folder: &Path) -> Result<Vec<String>> {
     Ok(notes)
 }
 
-/// Writes `run.csv`, `scene.toml` and `report.html`, and the summary on stdout. `duration` is what the run was to last.
-pub fn finish(outcome: &Outcome<'_>, duration: f64, notes: &[String], folder: &Path) -> Result<ExitCode> {
-    let Outcome { scene, recording, .. } = outcome;
-    write_folder(outcome, notes, folder)?;
-    let summary = recording.summary();
+/// Writes `scene.toml` and `report.html`, and the summary on stdout. `duration` is what the run was to last.
+pub fn finish(outcome: Outcome<'_>, duration: f64, notes: &[String], folder: &Path) -> Result<ExitCode> {
+    let (scene, cancelled) = (outcome.scene, outcome.digest.cancelled);
+    let summary = outcome.digest.summary();
+    let mut text = Vec::new();
+    print_summary(&mut text, &outcome, &summary)?;
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, scene.to_toml()?).with_context(|| format!("cannot write {}", path.display()))?;
+    let path = folder.join("report.html");
+    let html = report::run(outcome, notes)?;
+    std::fs::write(&path, html).with_context(|| format!("cannot write {}", path.display()))?;
     let mut out = std::io::stdout().lock();
-    print_summary(&mut out, outcome, &summary)?;
-    writeln!(out, "  {}", folder.join("report.html").display())?;
-    if recording.cancelled {
+    out.write_all(&text)?;
+    writeln!(out, "  {}", path.display())?;
+    if cancelled {
         eprintln!("{}: stopped after {:.3} s of {duration:.3} s", scene.name(), summary.duration);
     }
-    Ok(if summary.stable && !recording.cancelled { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if summary.stable && !cancelled { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// What a user should know of a scene before it runs.
@@ -152,24 +161,17 @@ pub fn record(scene: &Scene, title: &str, duration: f64) -> Result<Recording> {
     Ok(recording)
 }
 
-fn write_folder(outcome: &Outcome<'_>, notes: &[String], folder: &Path) -> Result<()> {
-    let Outcome { scene, recording, .. } = outcome;
+fn write_recording(recording: &Recording, folder: &Path) -> Result<()> {
     let path = folder.join("run.csv");
     let file = std::fs::File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
-    recording.write_csv(file).with_context(|| format!("cannot write {}", path.display()))?;
-    let path = folder.join("scene.toml");
-    std::fs::write(&path, scene.to_toml()?).with_context(|| format!("cannot write {}", path.display()))?;
-    let path = folder.join("report.html");
-    let html = report::run(outcome, notes)?;
-    std::fs::write(&path, html).with_context(|| format!("cannot write {}", path.display()))?;
-    Ok(())
+    recording.write_csv(file).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn print_summary(out: &mut impl Write, outcome: &Outcome<'_>, summary: &Summary) -> std::io::Result<()> {
-    let Outcome { scene, recording, time } = outcome;
+    let Outcome { scene, digest, time } = outcome;
     let state = if summary.stable { "stable" } else { "NOT STABLE" };
     writeln!(out, "{}: {:.3} s in {}, {state}", scene.name(), summary.duration, time.name())?;
-    if let Some(time) = recording.fault_time {
+    if let Some(time) = digest.fault_time() {
         writeln!(out, "  a fault took the force away at {time:.3} s, for good")?;
     }
     writeln!(

@@ -1,6 +1,7 @@
 //! Reports: one HTML file that needs nothing else, with pictures, tables and plots that can be zoomed.
 
 mod compare;
+mod digest;
 mod levels;
 mod picture;
 mod plot;
@@ -10,11 +11,12 @@ mod stability;
 mod timing;
 
 pub use compare::{Compared, comparison};
+pub use digest::Digest;
 pub use levels::levels;
 pub use reproduction::reproduction;
 pub use run::{Live, Outcome, Time, run};
 pub use stability::stability;
-pub use timing::{distribution_json, json as timing_json, left_out, ratio_json};
+pub use timing::{distribution_json, json as timing_json, left_out, ratio_json, records_lost};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

@@ -1,10 +1,11 @@
 //! Pictures of a scene at a moment of a run.
 
+use super::digest::Digest;
 use crate::render::{Camera, Colour, Picture, Style};
 use anyhow::Result;
 use hapteron::collision::mesh::TriMesh;
 use hapteron::collision::{Contact, QueryWorkspace, query};
-use hapteron::recording::{Recording, Row};
+use hapteron::recording::Row;
 use hapteron::scene::Scene;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -18,13 +19,11 @@ const CONTACT: Colour = [0, 120, 80];
 const FIELD_OF_VIEW: f64 = 0.5;
 
 /// Pictures of a run with captions: the whole scene with the path, the moment of the greatest contact force, and a cut through it.
-pub fn of_run(scene: &Scene, recording: &Recording) -> Result<Vec<(Vec<u8>, String)>> {
-    let Some(first) = recording.rows.first() else { return Ok(Vec::new()) };
-    let finite = |r: &&Row| r.body.translation.vector.iter().all(|c| c.is_finite());
+pub fn of_run(scene: &Scene, digest: &Digest) -> Result<Vec<(Vec<u8>, String)>> {
+    let Some(first) = &digest.first else { return Ok(Vec::new()) };
     let force = |r: &Row| r.contact[0].norm_squared();
-    let hardest = recording.rows.iter().filter(finite).max_by(|a, b| force(a).total_cmp(&force(b)));
-    let mut pictures = vec![overview(scene, recording, first)?];
-    if let Some(row) = hardest.filter(|r| force(r) > 0.0) {
+    let mut pictures = vec![overview(scene, &digest.way, first)?];
+    if let Some(row) = digest.hardest.as_ref().filter(|r| force(r) > 0.0) {
         pictures.push(close_up(scene, row, false)?);
         pictures.push(close_up(scene, row, true)?);
     }
@@ -83,21 +82,13 @@ fn draw(
     picture.draw_mesh(camera, mesh.vertices(), mesh.triangles(), body, &style);
 }
 
-fn overview(scene: &Scene, recording: &Recording, first: &Row) -> Result<(Vec<u8>, String)> {
+fn overview(scene: &Scene, path: &[Point3<f64>], first: &Row) -> Result<(Vec<u8>, String)> {
     let mut frame = Frame::default();
     frame.take(&scene.model.mesh, &first.body);
     for obstacle in &scene.obstacles {
         frame.take(&obstacle.model.mesh, &obstacle.world_from_mesh);
     }
-    let step = (recording.rows.len() / 400).max(1);
-    let path: Vec<Point3<f64>> = recording
-        .rows
-        .iter()
-        .step_by(step)
-        .map(|r| Point3::from(r.handle.translation.vector))
-        .filter(|p| p.iter().all(|c| c.is_finite()))
-        .collect();
-    frame.points.extend(&path);
+    frame.points.extend(path);
     let camera = frame.camera(Vector3::new(-0.75, 1.0, -0.6));
     let mut picture = Picture::new(SIZE[0], SIZE[1], BACKGROUND);
     draw(&mut picture, &camera, scene, &first.body, None);

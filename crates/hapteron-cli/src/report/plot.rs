@@ -45,15 +45,15 @@ impl Plots {
 
     /// Adds the abscissae of some series; gives the number to name them by.
     pub fn times(&mut self, times: &[f64]) -> Times {
-        let step = times.len().div_ceil(MOST_POINTS / 2).max(1);
-        let kept = if step == 1 {
-            times.iter().map(|&t| short(t)).collect()
-        } else {
-            // Two points a group, at its beginning and its middle.
-            let two = times.chunks(step).flat_map(|c| [short(c[0]), short(c[c.len() / 2])]);
-            two.collect()
-        };
-        self.times.push(kept);
+        let mut thinned = Thinned::times(times.len());
+        times.iter().for_each(|&t| thinned.push(t));
+        self.thinned_times(thinned)
+    }
+
+    /// The same of values that were thinned as they came.
+    pub fn thinned_times(&mut self, times: Thinned) -> Times {
+        let step = times.step;
+        self.times.push(times.finish());
         Times { index: self.times.len() - 1, step }
     }
 
@@ -83,12 +83,15 @@ impl Plot {
     }
 
     /// Adds a series; what is not finite leaves a gap.
-    pub fn series(mut self, label: &str, times: Times, values: &[f64]) -> Self {
-        let ys = if times.step == 1 {
-            values.iter().map(|&v| short(v)).collect()
-        } else {
-            values.chunks(times.step).flat_map(extremes).collect()
-        };
+    pub fn series(self, label: &str, times: Times, values: &[f64]) -> Self {
+        let mut thinned = Thinned { step: times.step, ..Thinned::values(0) };
+        values.iter().for_each(|&v| thinned.push(v));
+        self.thinned(label, times, thinned)
+    }
+
+    /// The same of values that were thinned as they came, as many as `times`.
+    pub fn thinned(mut self, label: &str, times: Times, values: Thinned) -> Self {
+        let ys = values.finish();
         self.series.push(Series { label: label.to_owned(), time: times.index, ys, colour: None });
         self
     }
@@ -114,18 +117,96 @@ impl Plot {
     }
 }
 
+/// Values of a series as they come: where there are too many, two of each group of neighbours are kept.
+pub struct Thinned {
+    step: usize,
+    group: Vec<f64>,
+    pick: fn(&[f64]) -> [f64; 2],
+    kept: Vec<Option<f64>>,
+}
+
+impl Thinned {
+    /// So many ordinates; the least and the greatest of a group are kept.
+    pub fn values(count: usize) -> Self {
+        Self::new(count, extremes)
+    }
+
+    /// So many abscissae; the first and the middle of a group are kept.
+    pub fn times(count: usize) -> Self {
+        Self::new(count, |group| [group[0], group[group.len() / 2]])
+    }
+
+    fn new(count: usize, pick: fn(&[f64]) -> [f64; 2]) -> Self {
+        Self { step: count.div_ceil(MOST_POINTS / 2).max(1), group: Vec::new(), pick, kept: Vec::new() }
+    }
+
+    /// Adds one.
+    pub fn push(&mut self, value: f64) {
+        if self.step == 1 {
+            self.kept.push(short(value));
+            return;
+        }
+        self.group.push(value);
+        if self.group.len() == self.step {
+            self.close();
+        }
+    }
+
+    fn close(&mut self) {
+        if !self.group.is_empty() {
+            self.kept.extend((self.pick)(&self.group).map(short));
+            self.group.clear();
+        }
+    }
+
+    fn finish(mut self) -> Vec<Option<f64>> {
+        self.close();
+        self.kept
+    }
+}
+
 /// Least and greatest, in the order in which they come.
-fn extremes(values: &[f64]) -> [Option<f64>; 2] {
+fn extremes(values: &[f64]) -> [f64; 2] {
     let mut least = 0;
     let mut most = 0;
     for (i, v) in values.iter().enumerate() {
         least = if *v < values[least] { i } else { least };
         most = if *v > values[most] { i } else { most };
     }
-    [short(values[least.min(most)]), short(values[least.max(most)])]
+    [values[least.min(most)], values[least.max(most)]]
 }
 
 /// Five significant digits: finer than any screen.
 fn short(value: f64) -> Option<f64> {
     if value.is_finite() { format!("{value:.5e}").parse().ok() } else { None }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Would catch a peak that is lost where a long run is thinned, a plot with more points than a browser bears, or a point that stands at another time.
+    #[test]
+    fn a_long_series_keeps_its_peaks_in_few_points() {
+        for count in [1usize, 19_999, 20_000, 20_001, 123_457, 3_600_001] {
+            let mut plots = Plots::new("time [s]");
+            let mut times = Thinned::times(count);
+            let mut values = Thinned::values(count);
+            let peak = count * 2 / 3;
+            for i in 0..count {
+                times.push(i as f64);
+                values.push(if i == peak { -7.0 } else { 0.25 });
+            }
+            let times = plots.thinned_times(times);
+            let plot = Plot::new("", "").thinned("", times, values);
+            let (xs, ys) = (&plots.times[0], &plot.series[0].ys);
+            assert!(xs.len() == ys.len() && ys.len() <= MOST_POINTS + 2, "{count}: {} points", ys.len());
+            let at: Vec<f64> = (0..ys.len()).filter(|&i| ys[i] == Some(-7.0)).filter_map(|i| xs[i]).collect();
+            assert!(!at.is_empty(), "{count}: the peak is gone");
+            assert!(
+                at.iter().all(|x| (x - peak as f64).abs() <= times.step as f64 + 20.0),
+                "{count}: {at:?}"
+            );
+        }
+    }
 }

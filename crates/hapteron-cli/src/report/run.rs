@@ -1,18 +1,13 @@
 //! The report of a run.
 
+use super::digest::Digest;
 use super::picture;
-use super::plot::{Plot, Plots};
 use super::timing;
 use super::{Cell, Page};
 use crate::commands::faults::Fault;
 use anyhow::Result;
-use hapteron::recording::{GREATEST_DEVIATION, Recording, Row};
 use hapteron::scene::{ContactModel, Scene};
 use hapteron::session::real_time::{End, Grants, Timing};
-use nalgebra::Vector3;
-
-/// Red in the list of colours of the script is the second; the magnitude is drawn dark.
-const DARK: usize = 3;
 
 /// A session in real time, beside its recording.
 pub struct Live {
@@ -22,8 +17,10 @@ pub struct Live {
     pub grants: Grants,
     /// Histograms and counts.
     pub timing: Timing,
-    /// Lateness and compute time of every tick, nanoseconds.
-    pub ticks: Vec<(u64, u64)>,
+    /// Ticks and passes that the files do not hold, because the disk was too slow or full.
+    pub unrecorded: u64,
+    /// Why the recording ended before the session, if it did.
+    pub trouble: Option<String>,
     /// Of the device.
     pub device: String,
     /// What took the force away.
@@ -52,21 +49,21 @@ impl Time {
 /// A run to be reported.
 pub struct Outcome<'a> {
     pub scene: &'a Scene,
-    pub recording: &'a Recording,
+    pub digest: Digest,
     pub time: Time,
 }
 
 /// `report.html` of a run. `notes` are said at its top.
-pub fn run(outcome: &Outcome<'_>, notes: &[String]) -> Result<String> {
-    let Outcome { scene, recording, time } = outcome;
-    let summary = recording.summary();
+pub fn run(outcome: Outcome<'_>, notes: &[String]) -> Result<String> {
+    let Outcome { scene, digest, time } = outcome;
+    let summary = digest.summary();
     let verdict = if summary.stable { "stable" } else { "not stable" };
     let mut page = Page::new(scene.name(), Some((verdict, summary.stable)));
-    page.paragraph(&what_was_run(scene, recording, time), true);
+    page.paragraph(&what_was_run(scene, &digest, &time), true);
     for note in notes {
         page.paragraph(note, false);
     }
-    let pace = match time {
+    let pace = match &time {
         Time::Virtual { wall, .. } => {
             (format!("{:.1} x", summary.duration / wall.max(1e-9)), "real time, computed")
         }
@@ -87,10 +84,10 @@ pub fn run(outcome: &Outcome<'_>, notes: &[String]) -> Result<String> {
         (format!("{:.0} mN", summary.force_roughness * 1e3), "rms force step a tick, in contact"),
         pace,
     ]);
-    page.pictures(&picture::of_run(scene, recording)?);
+    page.pictures(&picture::of_run(scene, &digest)?);
     page.heading("Over time");
-    page.plots(&plots(recording, time));
-    if let Time::Real(live) = time {
+    page.plots(&digest.plots(matches!(time, Time::Real(_))));
+    if let Time::Real(live) = &time {
         timing::section(&mut page, live);
     }
     page.heading("Setting");
@@ -98,7 +95,7 @@ pub fn run(outcome: &Outcome<'_>, notes: &[String]) -> Result<String> {
     page.details("scene.toml: every value of this run", &scene.to_toml()?);
     let again = match time {
         Time::Virtual { replayed: false, .. } => "hapteron run scene.toml --virtual-time",
-        _ => "hapteron run scene.toml --replay device.csv",
+        Time::Virtual { .. } | Time::Real(_) => "hapteron run scene.toml --replay device.csv",
     };
     page.paragraph(
         &format!("Repeat it bit for bit with: {again} (in this folder). The numbers behind the plots are in run.csv."),
@@ -107,7 +104,7 @@ pub fn run(outcome: &Outcome<'_>, notes: &[String]) -> Result<String> {
     Ok(page.finish())
 }
 
-fn what_was_run(scene: &Scene, recording: &Recording, time: &Time) -> String {
+fn what_was_run(scene: &Scene, digest: &Digest, time: &Time) -> String {
     let triangles = |mesh: &hapteron::collision::mesh::TriMesh| mesh.triangles().len();
     let obstacles: usize = scene.obstacles.iter().map(|o| triangles(&o.model.mesh)).sum();
     let hand = match time {
@@ -118,60 +115,23 @@ fn what_was_run(scene: &Scene, recording: &Recording, time: &Time) -> String {
     };
     let mut text = format!(
         "{:.3} s in {} at {:.0} Hz: a body of {:.3} g and {} triangles, held by {hand}, against {obstacles} triangles.",
-        recording.rows.last().map_or(0.0, |r| r.time),
+        digest.summary().duration,
         time.name(),
         1.0 / scene.time_step,
         scene.body.mass() * 1e3,
         triangles(&scene.model.mesh),
     );
-    if let Some(time) = recording.fault_time {
+    if let Some(time) = digest.fault_time() {
         text.push_str(&format!(" A fault took the force away at {time:.3} s, for good."));
     }
     match time {
         Time::Real(live) if !live.end.is_regular() => {
             text.push_str(&format!(" It ended early: {}.", live.end));
         }
-        _ if recording.cancelled => text.push_str(" Ended by Ctrl-C."),
+        _ if digest.cancelled => text.push_str(" Ended by Ctrl-C."),
         _ => {}
     }
     text
-}
-
-fn plots(recording: &Recording, time: &Time) -> Plots {
-    let rows = &recording.rows;
-    let mut plots = Plots::new("time [s]");
-    let column = |value: &dyn Fn(&Row) -> f64| rows.iter().map(value).collect::<Vec<f64>>();
-    let times = plots.times(&column(&|r| r.time));
-    let vector = |title: &str, unit: &str, scale: f64, get: &dyn Fn(&Row) -> Vector3<f64>| {
-        let mut plot = Plot::new(title, unit);
-        for (axis, label) in ["x", "y", "z"].into_iter().enumerate() {
-            plot = plot.series(label, times, &column(&|r| get(r)[axis] * scale));
-        }
-        plot.series("magnitude", times, &column(&|r| get(r).norm() * scale)).coloured(DARK)
-    };
-    plots.add(vector("Feedback force to the hand", "N", 1.0, &|r| r.feedback[0]));
-    plots.add(vector("Feedback torque to the hand", "mN m", 1e3, &|r| r.feedback[1]));
-    plots.add(vector("Contact force on the body", "N", 1.0, &|r| r.contact[0]));
-    plots.add(Plot::new("Penetration (negative: distance, as far as d)", "mm").series(
-        "penetration",
-        times,
-        &column(&|r| r.penetration * 1e3),
-    ));
-    plots.add(
-        Plot::new("Coupling deviation", "mm")
-            .series("deviation", times, &column(&|r| r.deviation * 1e3))
-            .clipped(GREATEST_DEVIATION * 1e3),
-    );
-    plots.add(
-        Plot::new("Contacts found and planes used (anticipation included)", "")
-            .series("contacts", times, &column(&|r| f64::from(r.contacts)))
-            .series("planes", times, &column(&|r| f64::from(r.clusters))),
-    );
-    plots.add(Plot::new("Age of the contacts", "ms").series("age", times, &column(&|r| r.contact_age * 1e3)));
-    if let Time::Real(live) = time {
-        timing::over_time(&mut plots, times, live);
-    }
-    plots
 }
 
 fn setting(scene: &Scene) -> Vec<Vec<Cell>> {

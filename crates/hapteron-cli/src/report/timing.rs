@@ -1,6 +1,6 @@
 //! The timing of a session in real time: a section of the report, and `timing.json`.
 
-use super::plot::{Plot, Plots, Times};
+use super::plot::{Plot, Plots};
 use super::run::Live;
 use super::{Cell, Page};
 use hapteron::session::real_time::{Distribution, Grants, Timing};
@@ -45,13 +45,16 @@ pub fn section(page: &mut Page, live: &Live) {
         "{} ticks, {} deadlines missed, {} contact passes; {} ticks used a device sample again.",
         timing.ticks, timing.missed, timing.passes, timing.repeated
     );
-    if timing.lost > 0 {
+    if records_lost(live) > 0 {
         text.push_str(&format!(
             " {} records were lost: the log is not complete and does not repeat the session exactly.",
-            timing.lost
+            records_lost(live)
         ));
     }
     page.paragraph(&text, false);
+    if let Some(trouble) = &live.trouble {
+        page.paragraph(trouble, false);
+    }
     if let Some(text) = left_out(live) {
         page.paragraph(&text, false);
     }
@@ -114,15 +117,9 @@ fn rare(timing: &Timing) -> Plots {
     plots
 }
 
-/// Plots over the time of the run.
-pub fn over_time(plots: &mut Plots, times: Times, live: &Live) {
-    let column = |get: &dyn Fn(&(u64, u64)) -> u64| {
-        live.ticks.iter().map(|t| get(t) as f64 * US).collect::<Vec<f64>>()
-    };
-    plots.add(
-        Plot::new("Lateness of the tick", "us").series("lateness", times, &column(&|t| t.0)).clipped(1000.0),
-    );
-    plots.add(Plot::new("Computing the tick", "us").series("computing", times, &column(&|t| t.1)));
+/// Ticks and passes that are not in the files.
+pub fn records_lost(live: &Live) -> u64 {
+    live.timing.lost + live.unrecorded
 }
 
 /// `timing.json`.
@@ -141,7 +138,8 @@ pub fn json(live: &Live) -> Value {
         "contact_passes": timing.passes,
         "samples_used_again": timing.repeated,
         "limited_by_device": timing.limited_by_device,
-        "records_lost": timing.lost,
+        "records_lost": records_lost(live),
+        "recording_trouble": live.trouble,
         "undelivered": {
             "ticks": timing.undelivered.ticks,
             "greatest_force": timing.undelivered.greatest_force,

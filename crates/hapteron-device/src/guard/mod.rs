@@ -162,7 +162,9 @@ impl Guard {
                 let command = self.limited(&wanted, &input.sample, dt, &mut status);
                 let s = &self.settings;
                 let thresholds = [s.oscillation_force, s.oscillation_torque];
-                if self.oscillation.take(&command, to_hand, thresholds, dt) {
+                let speed = input.sample.linear_velocity.norm_squared().sqrt() / s.max_speed;
+                let turning = input.sample.angular_velocity.norm_squared().sqrt() / s.max_angular_speed;
+                if self.oscillation.take(&command, to_hand, speed.max(turning), thresholds, dt) {
                     fault = Some(GuardFault::Oscillation);
                 } else if within(&command, s) {
                     self.older = [self.last, self.older[0]];

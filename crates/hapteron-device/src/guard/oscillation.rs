@@ -8,10 +8,11 @@
 //! more than a share of what went to and fro. Several [`Kind`]s of swings are looked for at once: usual ones, faint, slow and violent ones. Violent ones are
 //! an oscillation whatever the energy.
 //!
-//! Not seen: swings below 3 % of the greatest force, or slower than 2 Hz; slow ones that push to one side only (a handle thrown off a wall that falls back);
-//! faint ones that feed the hand little; and slow ones at the motors' limit from which the power limit takes the energy, as of a handle that nobody holds between walls
-//! of 1.5 to 3 kN/m, until it is faster than `max_speed`. The limits of force, slew, power and speed bound those. A hand that shakes something between two
-//! walls with all the motors' force looks the same, so that they cannot be told from it by the force.
+//! A handle that nobody holds, between walls of 1 to 3 kN/m, ends up thrown to and fro by all the motors' force 1.8 to 1.9 times a second. By force and energy
+//! alone it looks like a hand that shakes what is held fast, but no hand goes so fast against such a force: 1.4 to 1.6 m/s.
+//!
+//! Not seen: swings below 3 % of the greatest force, or slower than 2 Hz where they are not thrown; slow ones that push to one side only (a handle thrown off
+//! a wall that falls back); and faint ones that feed the hand little. The limits of force, slew, power and speed bound those.
 
 use crate::DeviceCommand;
 use nalgebra::Vector3;
@@ -33,21 +34,35 @@ struct Kind {
     time: f64,
     /// Energy to the hand as a share of all that went to and fro; none: whatever the energy.
     share: Option<f64>,
+    /// Between two swings the handle goes as fast as this share of the greatest speed, at least once.
+    speed: f64,
 }
 
 /// Hz. Motors at their limit slow an unstable loop down until damping and delay balance, at sqrt(b / (m t_d)): 10 to 12 Hz for hands of 0.1 to 0.5 kg.
 const FAST: [f64; 2] = [8.0, f64::INFINITY];
 /// The same for a handle that nobody holds, Hz. Ridges of a texture come faster.
 const SLOW: [f64; 2] = [2.0, 15.0];
-const KINDS: [Kind; 4] = [
+/// Hz, for one that is thrown to and fro.
+const THROWN: [f64; 2] = [1.0, 15.0];
+const KINDS: [Kind; 5] = [
     // Usual ones. An impact is over by then; a texture that is displayed late makes a little energy.
-    Kind { between: FAST, fast_part: true, size: 1.0, swings: 24, time: 0.3, share: Some(0.1) },
+    Kind { between: FAST, fast_part: true, size: 1.0, swings: 24, time: 0.3, share: Some(0.1), speed: 0.0 },
     // Violent ones.
-    Kind { between: FAST, fast_part: true, size: 4.0, swings: 24, time: 0.45, share: None },
+    Kind { between: FAST, fast_part: true, size: 4.0, swings: 24, time: 0.45, share: None, speed: 0.0 },
     // Faint ones.
-    Kind { between: FAST, fast_part: true, size: 0.3, swings: 24, time: 1.0, share: Some(0.1) },
+    Kind { between: FAST, fast_part: true, size: 0.3, swings: 24, time: 1.0, share: Some(0.1), speed: 0.0 },
     // Slow ones: a handle that nobody holds loses 1 or 2 % to its friction in each swing, and gets no more.
-    Kind { between: SLOW, fast_part: false, size: 0.6, swings: 9, time: 1.0, share: Some(0.005) },
+    Kind { between: SLOW, fast_part: false, size: 0.6, swings: 9, time: 1.0, share: Some(0.005), speed: 0.0 },
+    // A handle that is thrown to and fro.
+    Kind {
+        between: THROWN,
+        fast_part: false,
+        size: 8.0,
+        swings: 7,
+        time: 1.0,
+        share: Some(0.005),
+        speed: 0.5,
+    },
 ];
 
 /// A run of swings to alternating sides.
@@ -66,27 +81,39 @@ struct Run {
     energy: f64,
     /// Given or taken, J.
     traffic: f64,
+    /// The greatest since the last swing, as a share of the greatest allowed.
+    speed: f64,
+}
+
+/// What a run looks at besides the force on its axis.
+struct Motion {
+    /// Given to the hand since the last command, J.
+    energy: f64,
+    /// Of the handle, as a share of the greatest allowed.
+    speed: f64,
+    dt: f64,
 }
 
 impl Run {
     /// Takes one value of the fast part; whether with it the run is an oscillation. `force` is the threshold of the force.
-    fn take(&mut self, kind: &Kind, value: f64, threshold: f64, force: f64, energy: f64, dt: f64) -> bool {
-        self.since += dt;
-        self.lasted += dt;
-        self.energy += energy;
-        self.traffic += energy.abs();
+    fn take(&mut self, kind: &Kind, value: f64, threshold: f64, force: f64, motion: &Motion) -> bool {
+        self.since += motion.dt;
+        self.lasted += motion.dt;
+        self.energy += motion.energy;
+        self.traffic += motion.energy.abs();
+        self.speed = self.speed.max(motion.speed);
         let [slowest, fastest] = kind.between;
         if self.since > 0.5 / slowest {
             *self = Self::default();
         }
         let side = value.signum();
         if value.abs() > threshold * kind.size && side != self.side {
-            if self.first == 0.0 || self.since < 0.5 / fastest {
+            if self.first == 0.0 || self.since < 0.5 / fastest || self.speed < kind.speed {
                 *self = Self { first: side, ..Self::default() };
             }
             self.side = side;
             self.swings = self.swings.saturating_add(1);
-            self.since = 0.0;
+            (self.since, self.speed) = (0.0, 0.0);
         }
         // Energy that a spring holds for a while is not counted where the swing is the same as at the start.
         let long =
@@ -115,8 +142,17 @@ impl OscillationDetector {
         }
     }
 
-    /// Takes a command (N, N m) and the energy that went to the hand since the last one (J); whether it oscillates. Thresholds are those of force and torque.
-    pub fn take(&mut self, command: &DeviceCommand, energy: f64, thresholds: [f64; 2], dt: f64) -> bool {
+    /// Takes a command (N, N m), the energy that went to the hand since the last one (J), and the handle's speed as a share of the greatest allowed; whether it
+    /// oscillates. Thresholds are those of force and torque.
+    pub fn take(
+        &mut self,
+        command: &DeviceCommand,
+        energy: f64,
+        speed: f64,
+        thresholds: [f64; 2],
+        dt: f64,
+    ) -> bool {
+        let motion = Motion { energy, speed, dt };
         let now = [command.force, command.torque];
         let time_constant = 1.0 / (std::f64::consts::TAU * FAST[0]);
         let keep = time_constant / (time_constant + dt);
@@ -130,7 +166,7 @@ impl OscillationDetector {
                 for axis in 0..3 {
                     let value = if kind.fast_part { self.fast[what][axis] } else { now[what][axis] };
                     let run = &mut runs[what][axis];
-                    found |= run.take(kind, value, thresholds[what], thresholds[0], energy, dt);
+                    found |= run.take(kind, value, thresholds[what], thresholds[0], &motion);
                 }
             }
         }

@@ -39,7 +39,7 @@ pub const COLUMNS: [&str; 20] = [
 ];
 
 /// One tick, beside what follows from it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogRow {
     /// `now` of the tick.
     pub time: f64,
@@ -53,6 +53,47 @@ pub struct LogRow {
     pub ahead: Option<f64>,
     /// Applied before the tick.
     pub command: Option<Command>,
+}
+
+impl LogRow {
+    /// Of a tick; whether a pass looked at its state is not known yet.
+    pub(super) fn of(record: &TickRecord) -> Self {
+        Self {
+            time: record.time,
+            sample: record.sample,
+            flags: record.result.flags.only(OF_THE_LOOP),
+            contacts_of: record.contacts_of,
+            ahead: None,
+            command: record.command,
+        }
+    }
+
+    /// Writes its line of `device.csv`; the numbers read back to the same bits.
+    ///
+    /// # Errors
+    /// Those of the output.
+    pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
+        let s = &self.sample;
+        let q = &s.orientation;
+        let (p, v, w) = (s.position, s.linear_velocity, s.angular_velocity);
+        write!(out, "{},{},{},{},{},{},{},{}", self.time, p.x, p.y, p.z, q.w, q.i, q.j, q.k)?;
+        write!(out, ",{},{},{},{},{},{},{},{}", v.x, v.y, v.z, w.x, w.y, w.z, s.time, s.buttons)?;
+        write!(out, ",{},{},", self.flags.bits(), self.contacts_of)?;
+        if let Some(ahead) = self.ahead {
+            write!(out, "{ahead}")?;
+        }
+        writeln!(out, ",{}", self.command.as_ref().map_or_else(String::new, command::to_text))
+    }
+}
+
+/// Writes what stands in `device.csv` above the ticks: the columns, and how far ahead the pass at the start looked.
+///
+/// # Errors
+/// Those of the output.
+pub fn write_head(out: &mut impl Write, first_ahead: f64) -> io::Result<()> {
+    writeln!(out, "{}", COLUMNS.join(","))?;
+    // The pass at the start stands in a row of its own, without a tick.
+    writeln!(out, "0{},{first_ahead},", ",".repeat(17))
 }
 
 /// All ticks of a session.
@@ -79,14 +120,7 @@ impl Log {
     /// Adds a tick.
     pub fn push(&mut self, record: &TickRecord) {
         self.is_complete &= record.tick == self.rows.len() as u64 + 1;
-        self.rows.push(LogRow {
-            time: record.time,
-            sample: record.sample,
-            flags: record.result.flags.only(OF_THE_LOOP),
-            contacts_of: record.contacts_of,
-            ahead: None,
-            command: record.command,
-        });
+        self.rows.push(LogRow::of(record));
     }
 
     /// Adds a pass; the tick whose state it looked at must be there. Answers whether it was.
@@ -105,20 +139,9 @@ impl Log {
     /// Those of the file.
     pub fn write_csv(&self, output: impl Write) -> io::Result<()> {
         let mut out = io::BufWriter::new(output);
-        writeln!(out, "{}", COLUMNS.join(","))?;
-        // The pass at the start stands in a row of its own, without a tick.
-        writeln!(out, "0{},{},", ",".repeat(17), self.first_ahead)?;
+        write_head(&mut out, self.first_ahead)?;
         for row in &self.rows {
-            let s = &row.sample;
-            let q = &s.orientation;
-            let (p, v, w) = (s.position, s.linear_velocity, s.angular_velocity);
-            write!(out, "{},{},{},{},{},{},{},{}", row.time, p.x, p.y, p.z, q.w, q.i, q.j, q.k)?;
-            write!(out, ",{},{},{},{},{},{},{},{}", v.x, v.y, v.z, w.x, w.y, w.z, s.time, s.buttons)?;
-            write!(out, ",{},{},", row.flags.bits(), row.contacts_of)?;
-            if let Some(ahead) = row.ahead {
-                write!(out, "{ahead}")?;
-            }
-            writeln!(out, ",{}", row.command.as_ref().map_or_else(String::new, command::to_text))?;
+            row.write_csv(&mut out)?;
         }
         out.flush()
     }
@@ -129,13 +152,13 @@ impl Log {
         bytes.starts_with(COLUMNS.join(",").as_bytes())
     }
 
-    /// Reads `device.csv` of a session with this scene.
+    /// Reads `device.csv` of a session with this scene. A last line that was cut off, as by a crash, is left out.
     ///
     /// # Errors
     /// [`LogError`] with file, line and cure.
     pub fn read_csv(bytes: &[u8], name: &str, scene: &Scene) -> Result<Self, LogError> {
         let fail = |line: Option<u64>, problem: String| LogError { file: name.to_owned(), line, problem };
-        let mut reader = csv::Reader::from_reader(bytes);
+        let mut reader = csv::Reader::from_reader(crate::recording::whole_lines(bytes));
         let header = reader.headers().map_err(|e| fail(None, e.to_string()))?;
         if header.iter().ne(COLUMNS) {
             return Err(fail(Some(1), "this is not a device.csv of hapteron".to_owned()));

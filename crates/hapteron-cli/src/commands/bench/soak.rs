@@ -121,6 +121,7 @@ pub fn soak(seconds: f64, json: bool) -> Result<ExitCode> {
             "memory_after_one_cycle": early.memory,
             "memory_at_the_end": memory_end,
             "growth_bytes": growth,
+            "memory_by_cycle": cycles.iter().map(|c| c.memory).collect::<Vec<f64>>(),
             "mean_force_second_cycle": early.mean_force(),
             "mean_force_last_cycle": late.mean_force(),
             "force_drift": force_drift,

@@ -18,6 +18,7 @@ mod recorder;
 mod running;
 mod scene_device;
 mod shared;
+mod spool;
 mod supervisor;
 pub mod system;
 mod telemetry;
@@ -31,6 +32,7 @@ pub use recorder::{Recorded, Recorder};
 pub use running::{Finished, Running, Told};
 pub use scene_device::SceneDevice;
 pub use shared::End;
+pub use spool::{Spool, SpoolError, Spooled};
 pub use system::{Grant, Grants};
 pub use telemetry::{LatenessRatio, PassRecord, TickRecord, Timing, Undelivered};
 

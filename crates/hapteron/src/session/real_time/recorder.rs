@@ -1,4 +1,5 @@
-//! Makes a recording and a log of what a running session tells. Not real time.
+//! Makes a recording and a log of what a running session tells, in memory: for short sessions, and tests ([`super::Spool`] is for any). Not real
+//! time.
 
 use super::telemetry::{PassRecord, TickRecord};
 use crate::recording::{Recording, Row};
@@ -11,7 +12,7 @@ use std::sync::Arc;
 /// Collects ticks and passes, in their order.
 pub struct Recorder {
     scene: Arc<Scene>,
-    body: RigidBody,
+    rows: RowMaker,
     recording: Recording,
     log: Log,
     /// Passes whose tick has not been drained yet.
@@ -35,7 +36,7 @@ impl Recorder {
     #[must_use]
     pub fn new(scene: Arc<Scene>) -> Self {
         Self {
-            body: scene.body,
+            rows: RowMaker::new(Arc::clone(&scene)),
             scene,
             recording: Recording::new(),
             log: Log::new(),
@@ -46,13 +47,7 @@ impl Recorder {
 
     /// Adds a tick.
     pub fn tick(&mut self, record: &TickRecord) {
-        if let Some(Command::SetMass(body)) = &record.command {
-            self.body = *body;
-        }
-        // How deep it is, is known when its pass is, or measured at the end.
-        let unknown = f64::NAN;
-        let row = Row::of_body(&self.scene, &self.body, record.time, &record.result, unknown, record.counts);
-        self.recording.push(row, &record.result);
+        self.recording.push(self.rows.row(record), &record.result);
         self.log.push(record);
         self.timing.push((record.lateness_ns, record.compute_ns));
     }
@@ -100,6 +95,26 @@ impl Recorder {
             }
         }
         Recorded { recording: self.recording, log: self.log, timing: self.timing }
+    }
+}
+
+/// Makes rows of ticks. How deep they are, is known when their pass is, or measured at the end.
+pub(super) struct RowMaker {
+    scene: Arc<Scene>,
+    /// Commands may change its mass.
+    body: RigidBody,
+}
+
+impl RowMaker {
+    pub fn new(scene: Arc<Scene>) -> Self {
+        Self { body: scene.body, scene }
+    }
+
+    pub fn row(&mut self, record: &TickRecord) -> Row {
+        if let Some(Command::SetMass(body)) = &record.command {
+            self.body = *body;
+        }
+        Row::of_body(&self.scene, &self.body, record.time, &record.result, f64::NAN, record.counts)
     }
 }
 
