@@ -1,6 +1,6 @@
 //! Contacts at levels of detail against exact ones and against parry3d: `cargo bench -p hapteron-collision --bench clod`.
 //!
-//! Time per query along a 1 kHz motion (30 queries from one pose to the next; mean and 95 %, after the first query, whose time stands apart), contacts, samples looked at, total weight over
+//! Time per query along a 1 kHz motion (30 queries from one pose to the next; median, mean and 95 %, after the first query, whose time stands apart), contacts, samples looked at, total weight over
 //! the number of exact contacts, error of the total penalty force (all contacts k (d + depth) n, against exact, rms over the motion), and the
 //! greatest error of the least distance. One core. Thresholds are shares of the body's radius. `cpu ms` is the mean of what the thread itself
 //! got of a core (with the bench's own sums, some microseconds), for machines that others use too. `--quick`: a few poses; `--no-peer`:
@@ -13,6 +13,9 @@ use hapteron_collision::{Contact, Surface};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use std::path::Path;
 use std::time::Instant;
+
+#[path = "../tests/common/ball.rs"]
+mod shape;
 
 /// Steps of a 1 kHz motion between two poses, which are 30 ms apart.
 const STEPS: usize = 30;
@@ -29,13 +32,14 @@ struct Pair {
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     println!(
-        "{:<14} {:>9} {:>6} {:>9} {:>10} {:>10} {:>10} {:>10} {:>8} {:>8} {:>7} {:>9} {:>10}",
+        "{:<14} {:>9} {:>6} {:>9} {:>10} {:>10} {:>10} {:>10} {:>10} {:>8} {:>8} {:>7} {:>9} {:>10}",
         "pair",
         "triangles",
         "d mm",
         "threshold",
         "first ms",
         "cpu ms",
+        "median ms",
         "mean ms",
         "95 % ms",
         "contacts",
@@ -106,13 +110,14 @@ fn measure(pair: &Pair) {
             samples.push(workspace.samples().iter().sum::<usize>() as f64);
         }
         println!(
-            "{:<14} {:>9} {:>6} {:>8}% {:>10.3} {:>10.4} {:>10.4} {:>10.4} {:>8.0} {:>8.0} {:>7.3} {:>8.1}% {:>10.5}",
+            "{:<14} {:>9} {:>6} {:>8}% {:>10.3} {:>10.4} {:>10.4} {:>10.4} {:>10.4} {:>8.0} {:>8.0} {:>7.3} {:>8.1}% {:>10.5}",
             pair.name,
             pair.body.triangles().len() + pair.obstacle.triangles().len(),
             pair.tolerance * 1e3,
             share * 100.0,
             first * 1e3,
             (cpu_time() - cpu) / times.len() as f64 * 1e3,
+            quantile(&mut times, 0.5) * 1e3,
             times.iter().sum::<f64>() / times.len() as f64 * 1e3,
             quantile(&mut times, 0.95) * 1e3,
             quantile(&mut contacts, 0.5),
@@ -223,38 +228,9 @@ fn spheres(name: &'static str, n: u32) -> Pair {
 }
 
 fn sphere(n: u32, size: f64, cavity: bool) -> TriMesh {
-    let (rings, sectors) = (n + 1, 2 * n);
-    let mut vertices = vec![[0.0, 0.0, size]];
+    let radius = |theta: f64, phi: f64| size + 5e-4 * (14.0 * theta).sin() * (12.0 * phi).cos() * theta.sin();
     // The cavity's vertices stand between the sphere's.
-    let offset = if cavity { 0.5 } else { 0.0 };
-    for i in 1..rings {
-        let theta = core::f64::consts::PI * f64::from(i) / f64::from(rings);
-        for j in 0..sectors {
-            let phi = core::f64::consts::TAU * (f64::from(j) + offset) / f64::from(sectors);
-            let bump = 5e-4 * (14.0 * theta).sin() * (12.0 * phi).cos() * theta.sin();
-            let radius = size + bump;
-            vertices.push([
-                radius * theta.sin() * phi.cos(),
-                radius * theta.sin() * phi.sin(),
-                radius * theta.cos(),
-            ]);
-        }
-    }
-    vertices.push([0.0, 0.0, -size]);
-    let at = |i: u32, j: u32| 1 + (i - 1) * sectors + j % sectors;
-    let last = vertices.len() as u32 - 1;
-    let mut triangles = Vec::new();
-    for j in 0..sectors {
-        triangles.push([0, at(1, j), at(1, j + 1)]);
-        triangles.push([last, at(rings - 1, j + 1), at(rings - 1, j)]);
-        for i in 1..rings - 1 {
-            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
-            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
-        }
-    }
-    if cavity {
-        triangles.iter_mut().for_each(|t| t.swap(1, 2));
-    }
+    let (vertices, triangles) = shape::ball(n + 1, radius, cavity.then_some(0.5));
     TriMesh::new(vertices, triangles).unwrap()
 }
 

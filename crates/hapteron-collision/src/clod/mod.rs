@@ -7,8 +7,11 @@
 
 mod build;
 pub mod cache;
+mod middle;
 mod nearest;
 mod query;
+
+use middle::Middle;
 
 pub use build::{BuildError, Progress};
 pub use query::{Combine, Detail, Lod, LodWorkspace, View, query_levels};
@@ -129,6 +132,8 @@ pub struct Patch {
 pub struct Hierarchy {
     /// The root first, the children of a node side by side and after it.
     pub(crate) nodes: Vec<Node>,
+    /// By node.
+    pub(crate) middles: Vec<Middle>,
     pub(crate) hull_vertices: Vec<Vec3>,
     /// By corner the place in the node's range of hull vertices.
     pub(crate) faces: Vec<[u8; 3]>,
@@ -196,6 +201,12 @@ impl Hierarchy {
         self.nodes.get(node as usize).map(|n| n.level).filter(|level| *level != PURE_HULL)
     }
 
+    /// Greatest distance s between the original surface and the level's where a node is, metres; none as for [`Hierarchy::level_of`].
+    #[must_use]
+    pub fn deviation_of(&self, node: u32) -> Option<f64> {
+        self.level_of(node).map(|_| self.nodes[node as usize].deviation)
+    }
+
     fn patch(&self, node: &Node) -> Patch {
         Patch {
             vertices: self.hull(node).to_vec(),
@@ -223,6 +234,7 @@ impl Hierarchy {
         }
         core::mem::size_of::<Self>()
             + bytes(&self.nodes)
+            + bytes(&self.middles)
             + bytes(&self.hull_vertices)
             + bytes(&self.faces)
             + bytes(&self.triangles)

@@ -8,6 +8,9 @@ use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQuery;
 use std::path::Path;
 
+#[path = "../../tests/common/ball.rs"]
+mod shape;
+
 /// Plain pseudo-random numbers in [-1, 1).
 struct Random(u64);
 
@@ -33,29 +36,8 @@ fn build(surface: &Surface) -> Hierarchy {
 
 /// A sphere with bumps, `rings` from pole to pole.
 fn bumpy_sphere(rings: u32, bump: f64) -> Surface {
-    let sectors = 2 * rings;
-    let mut vertices = vec![[0.0, 0.0, 1.0]];
-    for i in 1..rings {
-        let theta = core::f64::consts::PI * f64::from(i) / f64::from(rings);
-        for j in 0..sectors {
-            let phi = core::f64::consts::TAU * f64::from(j) / f64::from(sectors);
-            let radius = 1.0 + bump * (6.0 * theta).sin() * (5.0 * phi).cos() * theta.sin();
-            let [x, y, z] = [theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()];
-            vertices.push([radius * x, radius * y, radius * z]);
-        }
-    }
-    vertices.push([0.0, 0.0, -1.0]);
-    let at = |i: u32, j: u32| 1 + (i - 1) * sectors + j % sectors;
-    let last = vertices.len() as u32 - 1;
-    let mut triangles = Vec::new();
-    for j in 0..sectors {
-        triangles.push([0, at(1, j), at(1, j + 1)]);
-        triangles.push([last, at(rings - 1, j + 1), at(rings - 1, j)]);
-        for i in 1..rings - 1 {
-            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
-            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
-        }
-    }
+    let radius = |theta: f64, phi: f64| 1.0 + bump * (6.0 * theta).sin() * (5.0 * phi).cos() * theta.sin();
+    let (vertices, triangles) = shape::ball(rings, radius, None);
     Surface::of_triangles(&vertices, &triangles)
 }
 

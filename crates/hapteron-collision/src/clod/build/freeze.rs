@@ -6,6 +6,7 @@ use super::samples;
 use super::simplify::Level;
 use super::tree::{Branch, Tree};
 use super::{BuildError, Progress, tell};
+use crate::clod::middle::middles;
 use crate::clod::{Hierarchy, Node, PURE_HULL, range};
 use crate::surface::Surface;
 use crate::vector::{Vec3, add, cross, dot, sub, unit_or_zero};
@@ -53,6 +54,7 @@ pub(super) fn freeze(
     let samples = samples::samples(surface, levels, tree);
     let mut result = Hierarchy {
         nodes: Vec::with_capacity(tree.branches.len()),
+        middles: Vec::new(),
         hull_vertices: Vec::new(),
         faces: Vec::new(),
         triangles: tree.triangles.clone(),
@@ -89,6 +91,7 @@ pub(super) fn freeze(
             samples,
         });
     }
+    result.middles = middles(surface, &result.nodes, &result.vertices);
     Ok(result)
 }
 

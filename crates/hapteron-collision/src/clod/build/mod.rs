@@ -14,7 +14,7 @@ mod work;
 
 use super::{Defect, DefectKind, Hierarchy};
 use crate::surface::{EdgeKind, Surface};
-use work::{Freedom, Work};
+use work::{Work, faces_around, is_one_fan};
 
 /// Told the share that is done (0 to 1); answering `false` stops the work.
 pub type Progress<'a> = dyn FnMut(f64) -> bool + 'a;
@@ -60,11 +60,6 @@ pub(super) fn defects(surface: &Surface) -> Vec<Defect> {
             EdgeKind::Convex | EdgeKind::Hollow => {}
         }
     }
-    let decomposition = decompose::Decomposition {
-        patch_of: vec![0; surface.triangles.len()],
-        patches: vec![(0..surface.triangles.len() as u32).collect()],
-    };
-    let work = Work::new(surface, decomposition, 0.0);
     let at_edge: Vec<bool> = surface.edges.iter().filter(|e| e.kind == EdgeKind::Unoriented).fold(
         vec![false; surface.vertices.len()],
         |mut marks, e| {
@@ -72,8 +67,8 @@ pub(super) fn defects(surface: &Surface) -> Vec<Defect> {
             marks
         },
     );
-    for (v, freedom) in work.freedom.iter().enumerate() {
-        if *freedom == Freedom::Fixed && !at_edge[v] {
+    for (v, around) in faces_around(surface).iter().enumerate() {
+        if !at_edge[v] && !is_one_fan(v as u32, around, &surface.triangles) {
             note(DefectKind::NonManifoldVertex, surface.vertices[v]);
         }
     }

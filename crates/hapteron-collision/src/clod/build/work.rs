@@ -50,12 +50,11 @@ pub(super) struct Work {
 impl Work {
     pub(super) fn new(surface: &Surface, decomposition: Decomposition, slack: f64) -> Self {
         let count = surface.vertices.len();
-        let mut around = vec![Vec::new(); count];
+        let around = faces_around(surface);
         let mut quadric = vec![Quadric::default(); count];
-        for (f, t) in surface.triangles.iter().enumerate() {
+        for t in &surface.triangles {
             let own = Quadric::triangle(t.map(|v| surface.vertices[v as usize]));
             for &v in t {
-                around[v as usize].push(f as u32);
                 quadric[v as usize].add(&own);
             }
         }
@@ -98,7 +97,7 @@ impl Work {
             }
         }
         for v in 0..self.position.len() as u32 {
-            if !self.is_one_fan(v) {
+            if !is_one_fan(v, &self.around[v as usize], &self.faces) {
                 self.freedom[v as usize] = Freedom::Fixed;
             }
         }
@@ -119,25 +118,6 @@ impl Work {
                 self.walls[v as usize].add(&Quadric::plane(wall, a, weight));
             }
         }
-    }
-
-    /// Whether the faces of a vertex hang together by edges at it.
-    fn is_one_fan(&self, vertex: u32) -> bool {
-        let faces = &self.around[vertex as usize];
-        let mut reached = vec![false; faces.len()];
-        let mut stack = vec![0];
-        while let Some(i) = stack.pop() {
-            if faces.is_empty() || std::mem::replace(&mut reached[i], true) {
-                continue;
-            }
-            for (j, &g) in faces.iter().enumerate() {
-                let touches = |&v: &u32| v != vertex && self.faces[faces[i] as usize].contains(&v);
-                if !reached[j] && self.faces[g as usize].iter().any(touches) {
-                    stack.push(j);
-                }
-            }
-        }
-        reached.iter().all(|&r| r)
     }
 
     pub(super) fn corners(&self, face: u32) -> [Vec3; 3] {
@@ -175,4 +155,31 @@ impl Work {
         self.part_of[gone as usize] = into;
         self.live -= 1;
     }
+}
+
+/// By vertex its faces.
+pub(super) fn faces_around(surface: &Surface) -> Vec<Vec<u32>> {
+    let mut around = vec![Vec::new(); surface.vertices.len()];
+    for (f, t) in surface.triangles.iter().enumerate() {
+        t.iter().for_each(|&v| around[v as usize].push(f as u32));
+    }
+    around
+}
+
+/// Whether the faces around a vertex hang together by edges at it.
+pub(super) fn is_one_fan(vertex: u32, around: &[u32], faces: &[[u32; 3]]) -> bool {
+    let mut reached = vec![false; around.len()];
+    let mut stack = vec![0];
+    while let Some(i) = stack.pop() {
+        if around.is_empty() || std::mem::replace(&mut reached[i], true) {
+            continue;
+        }
+        for (j, &g) in around.iter().enumerate() {
+            let touches = |&v: &u32| v != vertex && faces[around[i] as usize].contains(&v);
+            if !reached[j] && faces[g as usize].iter().any(touches) {
+                stack.push(j);
+            }
+        }
+    }
+    reached.iter().all(|&r| r)
 }

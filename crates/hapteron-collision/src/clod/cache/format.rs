@@ -4,6 +4,7 @@
 
 use super::key;
 use super::validate::validate;
+use crate::clod::middle::middles;
 use crate::clod::{Hierarchy, Node, Sample, format_version};
 use crate::surface::Surface;
 
@@ -108,8 +109,9 @@ impl Hierarchy {
             return Err(Refused::Damaged);
         }
         let [nodes, hull_vertices, faces, triangles, vertices, samples] = counts;
-        let hierarchy = Self {
+        let mut hierarchy = Self {
             nodes: (0..nodes).map(|_| reader.node()).collect::<Result<_, _>>()?,
+            middles: Vec::new(),
             hull_vertices: (0..hull_vertices).map(|_| reader.vec3()).collect::<Result<_, _>>()?,
             faces: (0..faces).map(|_| reader.take()).collect::<Result<_, _>>()?,
             triangles: (0..triangles).map(|_| reader.u32()).collect::<Result<_, _>>()?,
@@ -119,6 +121,7 @@ impl Hierarchy {
             identity: surface.identity,
         };
         validate(&hierarchy, surface).map_err(Refused::Impossible)?;
+        hierarchy.middles = middles(surface, &hierarchy.nodes, &hierarchy.vertices);
         Ok(hierarchy)
     }
 }

@@ -4,11 +4,12 @@
 //! changes by more than the surfaces have moved, that bounds its distance now, so most nodes are passed or refused without
 //! a search. And for every node how far it is replaced by its children, so that levels change smoothly.
 
-use super::known::Known;
+use super::known::Memory;
 use super::metric::Judge;
 use super::side::Search;
+use crate::clod::middle::Middle;
 use crate::clod::nearest::{Nearest, slack};
-use crate::clod::{Hierarchy, Node, PURE_HULL, Sample, range};
+use crate::clod::{Hierarchy, Node, PURE_HULL, range};
 use crate::query::feature::Foot;
 use crate::surface::Surface;
 use crate::vector::{Rigid, Vec3, dot, norm, sub};
@@ -20,13 +21,6 @@ pub(super) const REACH: f64 = 1.25;
 
 /// Searches note what is this many tolerances farther than they need to.
 const BAND: f64 = 0.5;
-
-/// A vertex of a node and the greatest distance of the node's vertices from it.
-#[derive(Clone, Copy, Debug)]
-struct Center {
-    vertex: u32,
-    extent: f64,
-}
 
 /// A sample within the tolerance.
 #[derive(Clone, Copy, Debug)]
@@ -49,11 +43,20 @@ pub(super) struct Tally {
     pub contact: f64,
 }
 
+/// A sample that is looked at.
+#[derive(Clone, Copy, Debug)]
+struct Planned {
+    vertex: u32,
+    weight: f32,
+    /// Where the memory of the vertex is.
+    place: usize,
+}
+
 /// The samples of a front whose levels are settled. They stay the ones to look at until the surfaces have moved as far as the
 /// reach goes beyond the tolerance, or other levels are wanted.
 #[derive(Clone, Debug, Default)]
 struct Plan {
-    samples: Vec<Sample>,
+    samples: Vec<Planned>,
     /// By sample a lower bound of its distance when it was last looked at, plus what the surfaces had moved by then in all.
     clear: Vec<f64>,
     /// What could be within the tolerance when the surfaces have moved this far in all, less the tolerance, is not planned for.
@@ -82,8 +85,7 @@ impl Plan {
 /// The front of one surface.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Front {
-    centers: Vec<Center>,
-    known: Vec<Known>,
+    memory: Memory,
     /// By node: 0 when it stands for itself, 1 when its children do, between the two while that changes.
     open: Vec<f32>,
     /// By node: the walk that looked at it last.
@@ -91,6 +93,9 @@ pub(super) struct Front {
     walk: u32,
     stack: Vec<(u32, f32)>,
     nearest: Nearest,
+    /// Searches through the tree in this query, and how many there may be.
+    searches: usize,
+    allowed: usize,
     plan: Plan,
     pub found: Vec<Found>,
     /// Somebody looks at the front: its nodes are noted as well.
@@ -103,13 +108,13 @@ impl Front {
     pub(super) fn reset(&mut self, surface: &Surface, hierarchy: &Hierarchy) {
         let count = hierarchy.nodes.len();
         *self = Self {
-            centers: centers(surface, hierarchy),
-            known: vec![Known::UNKNOWN; surface.vertices.len()],
+            memory: Memory::new(surface),
             open: vec![0.0; count],
             seen: vec![0; count],
             walk: 1,
             watched: self.watched,
             plan: Plan { until: f64::NEG_INFINITY, ..Plan::default() },
+            allowed: usize::MAX,
             ..Self::default()
         };
     }
@@ -120,9 +125,17 @@ impl Front {
         self.plan.until = f64::NEG_INFINITY;
     }
 
-    /// Whether every node near the other surface is at the finest level.
-    pub(super) fn is_finest(&self) -> bool {
-        self.plan.level <= 1.0 && self.plan.until > f64::NEG_INFINITY
+    /// By vertex the weight of its sample, in the order of vertices.
+    pub(super) fn weights(&self, weights: &mut Vec<(u32, f32)>) {
+        weights.clear();
+        weights.extend(self.plan.samples.iter().map(|s| (s.vertex, s.weight)));
+        weights.sort_unstable_by_key(|w| w.0);
+        // While levels change, a vertex can be a sample of two nodes.
+        weights.dedup_by(|next, kept| {
+            let same = next.0 == kept.0;
+            kept.1 += if same { next.1 } else { 0.0 };
+            same
+        });
     }
 
     /// How far a node is replaced by its children, after a step towards what the metrics ask for.
@@ -133,10 +146,12 @@ impl Front {
             return 1.0;
         }
         let moved = || norm(sub(search.motion.point(node.center), search.last.point(node.center)));
-        let wanted = if judge.refines(node, moved, self.open[i] > 0.5) { 1.0 } else { 0.0 };
+        let lately = self.seen[i] + 1 == self.walk;
+        // What is new to the front begins on the fine side.
+        let wanted = if judge.refines(node, moved, !lately || self.open[i] > 0.5) { 1.0 } else { 0.0 };
         // What was not near until now has no force yet and may change at once.
         let step = (wanted - self.open[i]).clamp(-1.0 / BLEND_STEPS, 1.0 / BLEND_STEPS);
-        let open = if self.seen[i] + 1 == self.walk { self.open[i] + step } else { wanted };
+        let open = if lately { self.open[i] + step } else { wanted };
         // Steps of a twentieth do not sum up to one exactly.
         let open = if (open - wanted).abs() < 1e-3 { wanted } else { open };
         self.open[i] = open;
@@ -146,38 +161,49 @@ impl Front {
 
     /// Whether some vertex of a node may be within the reach.
     #[inline(always)]
-    fn is_near(&mut self, center: Center, search: &Search<'_>) -> bool {
-        let known = self.known[center.vertex as usize];
-        let (moved, limit) = (search.travelled - known.at, REACH * search.tolerance + center.extent);
+    fn is_near(&mut self, middle: Middle, search: &Search<'_>) -> bool {
+        let place = self.memory.place(middle.vertex);
+        let known = self.memory.at(place);
+        let (moved, limit) = (search.travelled - known.at, REACH * search.tolerance + middle.extent);
         if known.distance - moved > limit {
             return false;
         }
         if known.exact && known.distance + moved <= limit {
             return true;
         }
-        self.look(center.vertex, search, limit).is_some()
+        self.look(middle.vertex, place, search, limit).is_some()
     }
 
     /// The place of a vertex and its foot, when that is within the limit.
     #[inline(always)]
-    fn look(&mut self, vertex: u32, search: &Search<'_>, limit: f64) -> Option<(Vec3, Foot)> {
+    fn look(&mut self, vertex: u32, place: usize, search: &Search<'_>, limit: f64) -> Option<(Vec3, Foot)> {
         let p = search.motion.point(search.own.vertices[vertex as usize]);
         let slack = slack(search.other.radius + search.tolerance);
-        let known = &mut self.known[vertex as usize];
-        let foot = known.look(p, search, limit, BAND * search.tolerance, slack, &mut self.nearest)?;
-        Some((p, foot))
+        let known = self.memory.at(place);
+        let before = known.searched;
+        let foot = known.look(p, search, limit, BAND * search.tolerance, slack, &mut self.nearest);
+        self.searches += usize::from(known.searched != before);
+        foot.map(|foot| (p, foot))
     }
 }
 
-/// Makes `found` the samples of the front that are within the tolerance.
+/// Makes `found` the samples of the front that are within the tolerance, with no more searches through the tree than about so many; none
+/// when these are not enough. What was found out by then is remembered.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-pub(super) fn find(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &Judge) -> Tally {
+pub(super) fn find(
+    front: &mut Front,
+    hierarchy: &Hierarchy,
+    search: &Search<'_>,
+    judge: &Judge,
+    allowed: usize,
+) -> Option<Tally> {
     front.found.clear();
+    (front.searches, front.allowed) = (0, allowed);
     if !front.watched {
         front.nodes.clear();
     }
     if !front.plan.serves(judge, search) || (front.watched && front.nodes.is_empty()) {
-        walk(front, hierarchy, search, judge);
+        walk(front, hierarchy, search, judge)?;
     }
     let mut plan = core::mem::take(&mut front.plan);
     let mut tally = plan.tally;
@@ -187,21 +213,24 @@ pub(super) fn find(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>
         if *clear > search.travelled + search.tolerance {
             continue;
         }
-        let Some((point, foot)) = front.look(sample.vertex, search, search.tolerance) else {
-            *clear = front.known[sample.vertex as usize].distance + search.travelled;
+        let Some((point, foot)) = front.look(sample.vertex, sample.place, search, search.tolerance) else {
+            *clear = front.memory.at(sample.place).distance + search.travelled;
             continue;
         };
         let pressed = 1.0 - foot.signed_distance / force_from;
         tally.contact += f64::from(sample.weight) * pressed.clamp(0.0, 1.0);
         front.found.push(Found { vertex: sample.vertex, weight: sample.weight, point, foot });
+        if front.searches >= front.allowed {
+            break;
+        }
     }
     front.plan = plan;
-    tally
+    (front.searches < front.allowed).then_some(tally)
 }
 
 /// Walks from the root to the front and plans which samples to look at.
 #[inline(always)]
-fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &Judge) {
+fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &Judge) -> Option<()> {
     front.walk += 1;
     front.nodes.clear();
     front.plan.begin(judge, search);
@@ -210,7 +239,11 @@ fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &J
     let mut tally = Tally::default();
     let reach = REACH * search.tolerance;
     while let Some((index, share)) = front.stack.pop() {
-        if !front.is_near(front.centers[index as usize], search) {
+        if front.searches >= front.allowed {
+            front.plan.until = f64::NEG_INFINITY;
+            return None;
+        }
+        if !front.is_near(hierarchy.middles[index as usize], search) {
             continue;
         }
         let node = &hierarchy.nodes[index as usize];
@@ -232,46 +265,24 @@ fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &J
             let weight = sample.weight * share * (1.0 - open);
             tally.samples += 1;
             tally.near += f64::from(weight);
-            let known = front.known[sample.vertex as usize];
+            let place = front.memory.place(sample.vertex);
+            let known = front.memory.at(place);
             let lower = known.distance + known.at;
             if lower - search.travelled <= reach {
-                front.plan.samples.push(Sample { weight, ..*sample });
+                front.plan.samples.push(Planned { vertex: sample.vertex, weight, place });
                 front.plan.clear.push(lower);
             }
         }
     }
     front.plan.tally = tally;
+    Some(())
 }
 
 /// The place of a vertex and its foot within the limit.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
 pub(super) fn foot(front: &mut Front, search: &Search<'_>, vertex: u32, limit: f64) -> Option<(Vec3, Foot)> {
-    front.look(vertex, search, limit)
-}
-
-/// By node the vertex in its middle. A node without vertices of its own is never near.
-fn centers(surface: &Surface, hierarchy: &Hierarchy) -> Vec<Center> {
-    let at = |v: u32| surface.vertices[v as usize];
-    hierarchy
-        .nodes
-        .iter()
-        .map(|node| {
-            let own = &hierarchy.vertices[range(node.vertices)];
-            let squared = |v: u32, p: Vec3| {
-                let d = sub(at(v), p);
-                dot(d, d)
-            };
-            let nearest = own
-                .iter()
-                .copied()
-                .min_by(|&a, &b| squared(a, node.center).total_cmp(&squared(b, node.center)));
-            let Some(vertex) = nearest else {
-                return Center { vertex: 0, extent: f64::NEG_INFINITY };
-            };
-            let extent = own.iter().map(|&v| squared(v, at(vertex))).fold(0.0, f64::max).sqrt();
-            Center { vertex, extent: extent * (1.0 + 1e-12) }
-        })
-        .collect()
+    let place = front.memory.place(vertex);
+    front.look(vertex, place, search, limit)
 }
 
 /// Upper bound of how far any point of the sphere around a surface moves between two motions.

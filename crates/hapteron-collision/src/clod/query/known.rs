@@ -28,11 +28,46 @@ pub(super) struct Known {
     /// Whether `distance` is exact and not only a lower bound.
     pub exact: bool,
     /// ... when the surfaces had moved this far in all.
-    searched: f64,
+    pub searched: f64,
     /// Its distance to the other surface, or a lower bound ...
     pub distance: f64,
     /// ... when the surfaces had moved this far in all.
     pub at: f64,
+}
+
+/// What is known of the vertices of a surface, in pages: only those near the other surface are ever looked at, and near vertices have
+/// close numbers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory {
+    /// By page of vertices: where it is, plus one; zero as long as none of its vertices was looked at.
+    pages: Vec<u32>,
+    known: Vec<Known>,
+}
+
+/// Vertices in a page.
+const PAGE: usize = 32;
+
+impl Memory {
+    /// Forgets everything and makes room for a surface.
+    pub(super) fn new(surface: &Surface) -> Self {
+        Self { pages: vec![0; surface.vertices.len().div_ceil(PAGE)], known: Vec::new() }
+    }
+
+    /// Where a vertex has its place.
+    #[inline(always)]
+    pub(super) fn place(&mut self, vertex: u32) -> usize {
+        let page = vertex as usize / PAGE;
+        if self.pages[page] == 0 {
+            self.known.resize(self.known.len() + PAGE, Known::UNKNOWN);
+            self.pages[page] = (self.known.len() / PAGE) as u32;
+        }
+        (self.pages[page] as usize - 1) * PAGE + vertex as usize % PAGE
+    }
+
+    #[inline(always)]
+    pub(super) fn at(&mut self, place: usize) -> &mut Known {
+        &mut self.known[place]
+    }
 }
 
 impl Known {

@@ -3,52 +3,25 @@
 use super::front::{Front, foot};
 use super::side::Search;
 use crate::clod::nearest::{NOWHERE, Nearest, search, slack};
-use crate::surface::Surface;
-use crate::vector::{norm, sub};
+use crate::query::feature::Feature;
+use crate::vector::{Vec3, add, dot, norm, scale, sub};
 
 /// Steps of a descent; each goes to the closest of the neighbours, so few are needed.
 const STEPS: usize = 32;
 /// Steps of projecting to and fro between the surfaces, where they do not cross.
-const PROJECTIONS: usize = 8;
+const PROJECTIONS: usize = 16;
 
 /// The closest samples of a query, and the closest vertices of the last one to begin with.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Least {
     best: [Option<(u32, f64)>; 2],
     last: [Option<u32>; 2],
-    around: [Around; 2],
     nearest: Nearest,
 }
 
-/// By vertex the vertices next to it.
-#[derive(Clone, Debug, Default)]
-struct Around {
-    begin: Vec<u32>,
-    next: Vec<u32>,
-}
-
-impl Around {
-    fn new(surface: &Surface) -> Self {
-        let mut begin = vec![0u32; surface.vertices.len() + 1];
-        surface.edges.iter().flat_map(|e| e.vertices).for_each(|v| begin[v as usize + 1] += 1);
-        for v in 0..surface.vertices.len() {
-            begin[v + 1] += begin[v];
-        }
-        let mut place = begin.clone();
-        let mut next = vec![0; 2 * surface.edges.len()];
-        for [a, b] in surface.edges.iter().map(|e| e.vertices) {
-            for (from, to) in [(a, b), (b, a)] {
-                next[place[from as usize] as usize] = to;
-                place[from as usize] += 1;
-            }
-        }
-        Self { begin, next }
-    }
-}
-
 impl Least {
-    pub(super) fn reset(&mut self, body: &Surface, obstacle: &Surface) {
-        *self = Self { around: [Around::new(body), Around::new(obstacle)], ..Self::default() };
+    pub(super) fn reset(&mut self) {
+        self.last = [None; 2];
     }
 
     pub(super) fn begin(&mut self) {
@@ -74,14 +47,14 @@ impl Least {
             self.last[k] = None;
             let mut own = f64::INFINITY;
             for start in starts.into_iter().flatten() {
-                let end = self.descend(k, front, searches[k], start);
+                let end = Self::descend(front, searches[k], start);
                 if let Some((vertex, signed)) = end.filter(|e| e.1 < own) {
                     own = signed;
                     self.last[k] = Some(vertex);
                 }
             }
             if own > 0.0 && own.is_finite() {
-                own = own.min(self.project(k, front, searches));
+                own = own.min(self.project(k, front, searches)).min(self.cross(k, front, searches));
             }
             least = least.min(own);
         }
@@ -89,16 +62,15 @@ impl Least {
     }
 
     /// From vertex to vertex as long as the signed distance falls.
-    fn descend(&self, k: usize, front: &mut Front, look: &Search<'_>, start: u32) -> Option<(u32, f64)> {
+    fn descend(front: &mut Front, look: &Search<'_>, start: u32) -> Option<(u32, f64)> {
         let mut signed =
             |vertex: u32| foot(front, look, vertex, look.tolerance).map(|(_, f)| f.signed_distance);
         let mut at = (start, signed(start)?);
         for _ in 0..STEPS {
             let mut better = at;
-            let around = &self.around[k];
-            for &v in
-                &around.next[around.begin[at.0 as usize] as usize..around.begin[at.0 as usize + 1] as usize]
-            {
+            for &edge in look.own.edges_at(at.0) {
+                let [a, b] = look.own.edges[edge as usize].vertices;
+                let v = if a == at.0 { b } else { a };
                 if let Some(d) = signed(v).filter(|&d| d < better.1) {
                     better = (v, d);
                 }
@@ -135,11 +107,51 @@ impl Least {
             let closer = norm(sub(on, p));
             let gain = distance - closer;
             distance = distance.min(closer);
-            if gain < 1e-3 * distance {
+            if gain < 1e-5 * distance {
                 break;
             }
             p = motion.point(on);
         }
         distance
     }
+
+    /// Least distance of the edges at the closest vertex to those around its foot, in their middles, where they have not passed each other.
+    fn cross(&self, k: usize, front: &mut Front, searches: [&Search<'_>; 2]) -> f64 {
+        let look = searches[k];
+        let found = self.last[k].and_then(|v| foot(front, look, v, look.tolerance).map(|(p, f)| (v, p, f)));
+        let Some((vertex, p, foot)) = found else { return f64::INFINITY };
+        let corners: &[u32] = match foot.feature {
+            Feature::Vertex(v) => &[v],
+            Feature::Edge(e) => &look.other.edges[e as usize].vertices,
+            Feature::Face(t) => &look.other.triangles[t as usize],
+        };
+        let mut least = f64::INFINITY;
+        for &edge in look.own.edges_at(vertex) {
+            let own = &look.own.edges[edge as usize];
+            let end = own.vertices[usize::from(own.vertices[0] == vertex)];
+            let along = sub(look.motion.point(look.own.vertices[end as usize]), p);
+            let outward = look.motion.direction(own.normal.map(f64::from));
+            for &edge in corners.iter().flat_map(|&c| look.other.edges_at(c)) {
+                let theirs = look.other.edges[edge as usize].vertices;
+                let [start, end] = theirs.map(|v| look.other.vertices[v as usize]);
+                if let Some(between) = between_middles([p, along], [start, sub(end, start)]) {
+                    let ahead = dot(between, outward) > 0.0;
+                    least = if ahead { least.min(norm(between)) } else { least };
+                }
+            }
+        }
+        least
+    }
+}
+
+/// From one segment (start and direction) to another along their common perpendicular, when that meets both between their ends.
+fn between_middles([p, d]: [Vec3; 2], [q, e]: [Vec3; 2]) -> Option<Vec3> {
+    let r = sub(p, q);
+    let (a, b, c) = (dot(d, d), dot(d, e), dot(e, e));
+    let whole = a * c - b * b;
+    let s = (b * dot(e, r) - c * dot(d, r)) / whole;
+    let t = (a * dot(e, r) - b * dot(d, r)) / whole;
+    // Comparisons with a NaN (parallel segments) are false.
+    let within = s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
+    within.then(|| sub(add(q, scale(e, t)), add(p, scale(d, s))))
 }

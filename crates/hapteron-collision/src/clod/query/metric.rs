@@ -1,7 +1,7 @@
 //! When a patch is good enough: the error metrics of method A.4.
 
 use super::front::Tally;
-use crate::clod::{Node, PURE_HULL};
+use crate::clod::{Hierarchy, Node, PURE_HULL};
 use crate::vector::{Vec3, norm, sub};
 use nalgebra::Point3;
 
@@ -139,6 +139,11 @@ pub(super) struct Density {
 }
 
 impl Density {
+    /// As if the whole surface were near, until more is known.
+    pub(super) fn coarsest(hierarchy: &Hierarchy) -> Self {
+        Self { near: hierarchy.vertices.len() as f64, ..Self::default() }
+    }
+
     /// Takes in what the last walk came past.
     pub(super) fn observe(&mut self, tally: &Tally) {
         let share = if self.known { SMOOTHING } else { 1.0 };

@@ -26,10 +26,7 @@ use least::Least;
 use metric::{Density, Judge};
 use nalgebra::{Isometry3, Vector3};
 use side::Search;
-use small::{Pace, Way};
-
-/// The first query of a pair looks this often.
-const FIRST_LOOKS: usize = 4;
+use small::{Pace, Seen, Warmth, Way};
 
 /// A query that takes longer than its budget makes the next ones this much more lenient, up to a limit.
 const LENIENT: f64 = 1.2;
@@ -70,7 +67,10 @@ pub struct LodWorkspace {
     least: Least,
     leniency: f64,
     way: Way,
+    warmth: Warmth,
     pace: Pace,
+    /// By side the weights of the front's samples, while they matter.
+    weights: [Vec<(u32, f32)>; 2],
 }
 
 /// Of the last query.
@@ -123,10 +123,10 @@ impl LodWorkspace {
             for (front, lod) in self.fronts.iter_mut().zip([pair.body, pair.obstacle]) {
                 front.reset(lod.surface, lod.hierarchy);
             }
-            self.least.reset(pair.body.surface, pair.obstacle.surface);
-            self.densities = [Density::default(); 2];
+            self.least.reset();
             self.leniency = 1.0;
-            self.way = Way::Levels;
+            self.way = Way::default();
+            self.warmth = Warmth::Cold;
             self.pace = Pace::default();
         }
         known
@@ -143,6 +143,16 @@ struct Pair<'a> {
     motion: Rigid,
     inverse: Rigid,
     tolerance: f64,
+}
+
+/// A pair with what its levels depend on.
+struct Scenery<'a> {
+    pair: Pair<'a>,
+    /// From the body's mesh frame to the obstacle's in the last query.
+    last: Rigid,
+    detail: &'a Detail,
+    /// The eye in either mesh frame.
+    eye: [Vec3; 2],
 }
 
 fn inverse(motion: &Rigid) -> Rigid {
@@ -192,10 +202,10 @@ pub fn query_levels<'a>(
     let world = Rigid::from_isometry(world_from_obstacle);
     let known = workspace.prepare(&pair);
     let last = known.map_or(pair.motion, |s| s.motion);
-    let min_distance = match (workspace.way, known.is_some()) {
-        (Way::Exact(share), true) => workspace.find_exactly(&pair, share),
-        (_, true) => workspace.find_next(&pair, &last, detail, eye, &world),
-        (_, false) => workspace.find_first(&pair, detail, eye, &world),
+    let scenery = Scenery { pair, last, detail, eye };
+    let min_distance = match workspace.way {
+        Way::Exact(share) => workspace.find_exactly(&scenery, share),
+        Way::Levels => workspace.find_by_levels(&scenery, &world),
     };
     if let (Some(started), Some(budget)) = (started, detail.budget_us) {
         let share = started.elapsed().as_secs_f64() * 1e6 / budget;
@@ -209,81 +219,109 @@ pub fn query_levels<'a>(
 }
 
 impl LodWorkspace {
-    /// The first query on two surfaces.
-    fn find_first(&mut self, pair: &Pair<'_>, detail: &Detail, eye: [Vec3; 2], world: &Rigid) -> f64 {
-        let mut min_distance = f64::INFINITY;
-        // How large the contact is shows only when it has been looked at.
-        for _ in 0..FIRST_LOOKS {
-            self.fronts.iter_mut().for_each(Front::settle);
-            self.densities.iter_mut().for_each(Density::forget);
-            min_distance = self.find(pair, &pair.motion, detail, eye, world);
-        }
-        self.way = Way::first(self.vertices());
-        if let Way::Exact(share) = self.way { self.find_exactly(pair, share) } else { min_distance }
-    }
-
-    /// The next query by levels.
-    fn find_next(
-        &mut self,
-        pair: &Pair<'_>,
-        last: &Rigid,
-        detail: &Detail,
-        eye: [Vec3; 2],
-        world: &Rigid,
-    ) -> f64 {
-        let min_distance = self.find(pair, last, detail, eye, world);
-        let finest = self.fronts.iter().all(Front::is_finest);
-        let pressed = -min_distance / pair.tolerance;
-        self.way = self.way.after_levels(self.vertices(), finest, self.pace, pressed);
-        min_distance
-    }
-
-    /// By the exact query.
-    fn find_exactly(&mut self, pair: &Pair<'_>, share: f32) -> f64 {
-        let [world_from_body, world_from_obstacle] = pair.poses;
-        let surfaces = [pair.body.surface, pair.obstacle.surface];
-        let [a, b] = surfaces;
-        let found = query(a, world_from_body, b, world_from_obstacle, pair.tolerance, &mut self.exact);
-        small::fade(found.contacts, surfaces, share, &mut self.contacts);
-        let pressed = -found.min_distance / pair.tolerance;
-        self.way = self.way.after_exact(found.contacts.len(), self.leniency > 1.0, self.pace, pressed);
-        self.tallies = [Tally::default(); 2];
-        self.fronts.iter_mut().for_each(|front| front.nodes.clear());
-        if self.way == Way::Levels {
-            // They begin at the finest level, where the contacts are the same.
-            self.fronts.iter_mut().for_each(Front::settle);
-            self.densities = [Density::default(); 2];
-        }
-        found.min_distance
-    }
-
-    /// Vertices that the contacts stand for.
-    fn vertices(&self) -> f64 {
-        self.contacts.iter().map(|c| c.weight).sum()
-    }
-
-    /// Makes the contacts; returns the least distance.
-    fn find(&mut self, pair: &Pair<'_>, last: &Rigid, detail: &Detail, eye: [Vec3; 2], world: &Rigid) -> f64 {
-        let (a, b) = (pair.body.surface, pair.obstacle.surface);
-        let travelled = self.state.map_or(0.0, |s| s.travelled);
-        let back = inverse(last);
-        let of_body =
-            Search { own: a, other: b, motion: &pair.motion, last, tolerance: pair.tolerance, travelled };
-        let of_obstacle = Search { own: b, other: a, motion: &pair.inverse, last: &back, ..of_body };
-        let radius = pair.body.hierarchy.radius();
-        let hierarchies = [pair.body.hierarchy, pair.obstacle.hierarchy];
-        for (k, search) in [&of_body, &of_obstacle].into_iter().enumerate() {
-            let weight =
-                if self.way == Way::Refining { 1.0 } else { self.densities[k].weight(detail, radius) };
-            let judge = Judge { detail: *detail, weight, eye: eye[k], leniency: self.leniency };
-            self.tallies[k] = find(&mut self.fronts[k], hierarchies[k], search, &judge);
-            self.densities[k].observe(&self.tallies[k]);
-        }
+    /// By levels.
+    fn find_by_levels(&mut self, scenery: &Scenery<'_>, world: &Rigid) -> f64 {
+        self.look(scenery, usize::MAX);
+        let pair = &scenery.pair;
         self.contacts.clear();
         self.least.begin();
         self.push_body(pair, world);
         self.push_obstacle(pair, world);
-        self.least.refine(&mut self.fronts, [&of_body, &of_obstacle])
+        let back = inverse(&scenery.last);
+        let [of_body, of_obstacle] = self.searches(scenery, &back);
+        let min_distance = self.least.refine(&mut self.fronts, [&of_body, &of_obstacle]);
+        let vertices: f64 = self.contacts.iter().map(|c| c.weight).sum();
+        let pressed = -min_distance / pair.tolerance;
+        self.way = small::after_levels(vertices, pressed, self.leniency > 1.0, self.pace);
+        if self.way != Way::Levels {
+            let Self { fronts, weights, .. } = self;
+            fronts.iter().zip(weights).for_each(|(front, weights)| front.weights(weights));
+        }
+        min_distance
+    }
+
+    /// By the exact query, and on towards the levels when these would be better.
+    fn find_exactly(&mut self, scenery: &Scenery<'_>, share: f32) -> f64 {
+        let pair = &scenery.pair;
+        let [world_from_body, world_from_obstacle] = pair.poses;
+        let surfaces = [pair.body.surface, pair.obstacle.surface];
+        let [a, b] = surfaces;
+        let found = query(a, world_from_body, b, world_from_obstacle, pair.tolerance, &mut self.exact);
+        small::fade(found.contacts, surfaces, share, &self.weights, pair.tolerance, &mut self.contacts);
+        let min_distance = found.min_distance;
+        let seen = Seen {
+            contacts: found.contacts.len(),
+            pressed: -min_distance / pair.tolerance,
+            late: self.leniency > 1.0,
+            pace: self.pace,
+        };
+        if seen.asks_for_levels() {
+            self.way = self.approach_levels(scenery, share, seen.searches());
+        } else {
+            self.way = small::blended(share, false);
+            if self.way == Way::Exact(1.0) && !matches!(self.warmth, Warmth::Resting(_)) {
+                self.warmth = Warmth::Cold;
+            }
+        }
+        self.tallies = [Tally::default(); 2];
+        self.fronts.iter_mut().for_each(|front| front.nodes.clear());
+        min_distance
+    }
+
+    /// Makes the fronts readier, and lets them take over when they are ready.
+    fn approach_levels(&mut self, scenery: &Scenery<'_>, share: f32, searches: usize) -> Way {
+        match self.warmth {
+            Warmth::Warm => {
+                self.look(scenery, usize::MAX);
+                let Self { fronts, weights, .. } = self;
+                fronts.iter().zip(weights).for_each(|(front, weights)| front.weights(weights));
+                return small::blended(share, true);
+            }
+            Warmth::Resting(queries) => {
+                self.warmth = if queries > 0 { Warmth::Resting(queries - 1) } else { Warmth::Cold };
+            }
+            Warmth::Cold => {
+                let hierarchies = [scenery.pair.body.hierarchy, scenery.pair.obstacle.hierarchy];
+                self.densities = hierarchies.map(Density::coarsest);
+                self.warmth = Warmth::Warming(0);
+            }
+            Warmth::Warming(_) => {
+                self.fronts.iter_mut().for_each(Front::settle);
+                self.densities.iter_mut().for_each(Density::forget);
+                let ready = self.look(scenery, searches);
+                self.warmth = self.warmth.after(ready);
+            }
+        }
+        Way::Exact(share)
+    }
+
+    fn searches<'a>(&self, scenery: &'a Scenery<'_>, back: &'a Rigid) -> [Search<'a>; 2] {
+        let Scenery { pair, last, .. } = scenery;
+        let (own, other) = (pair.body.surface, pair.obstacle.surface);
+        let travelled = self.state.map_or(0.0, |s| s.travelled);
+        let of_body = Search { own, other, motion: &pair.motion, last, tolerance: pair.tolerance, travelled };
+        [of_body, Search { own: other, other: own, motion: &pair.inverse, last: back, ..of_body }]
+    }
+
+    /// Looks for the samples within the tolerance, with no more searches than about so many. True when that was enough and the levels
+    /// are those that the contact asks for.
+    fn look(&mut self, scenery: &Scenery<'_>, allowed: usize) -> bool {
+        let Scenery { pair, detail, eye, .. } = scenery;
+        let back = inverse(&scenery.last);
+        let radius = pair.body.hierarchy.radius();
+        let searches = self.searches(scenery, &back);
+        let mut settled = true;
+        for (k, hierarchy) in [pair.body.hierarchy, pair.obstacle.hierarchy].into_iter().enumerate() {
+            let weight = self.densities[k].weight(detail, radius);
+            let judge = Judge { detail: **detail, weight, eye: eye[k], leniency: self.leniency };
+            let Some(tally) = find(&mut self.fronts[k], hierarchy, &searches[k], &judge, allowed) else {
+                return false;
+            };
+            self.tallies[k] = tally;
+            self.densities[k].observe(&tally);
+            settled &= self.densities[k].weight(detail, radius) == weight;
+        }
+        settled
     }
 
     fn push_body(&mut self, pair: &Pair<'_>, world: &Rigid) {
