@@ -6,7 +6,8 @@ use anyhow::{Result, bail};
 use hapteron::scene::Scene;
 use hapteron::scenes;
 use hapteron::session::real_time::{
-    RealTime, RealTimeOptions, SceneDevice, TickRecord, Told, clock, system::resident_bytes,
+    RealTime, RealTimeOptions, SceneDevice, TickRecord, Told, clock,
+    system::{allocated_bytes, resident_bytes},
 };
 use serde_json::json;
 use std::io::Write;
@@ -14,8 +15,8 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// More growth of memory than this after the first cycle is a leak, bytes.
-const LEAK: f64 = 2.0e6;
+/// More growth than this of what is allocated, or where that is not known of what is resident, after the first cycle is a leak, bytes.
+const LEAK: [f64; 2] = [0.25e6, 4.0e6];
 /// More change than this of what each cycle of the motion repeats is a drift, as a share.
 const DRIFT: f64 = 0.1;
 /// The clock of the ticks may be this far from the machine's at the end, seconds: a look every 50 ms, and the start of the threads.
@@ -29,7 +30,41 @@ struct Cycle {
     greatest_force: f64,
     compute_ns: u64,
     late_ns: u64,
-    memory: f64,
+    /// At its beginning.
+    memory: Memory,
+}
+
+/// Bytes.
+#[derive(Clone, Copy, Default)]
+struct Memory {
+    allocated: Option<u64>,
+    resident: u64,
+}
+
+impl Memory {
+    fn now() -> Self {
+        Self { allocated: allocated_bytes(), resident: resident_bytes().unwrap_or(0) }
+    }
+
+    fn growth(self, since: Self) -> Growth {
+        let difference = |now: u64, then: u64| now as f64 - then as f64;
+        Growth {
+            allocated: self.allocated.zip(since.allocated).map(|(now, then)| difference(now, then)),
+            resident: difference(self.resident, since.resident),
+        }
+    }
+}
+
+/// Bytes.
+struct Growth {
+    allocated: Option<f64>,
+    resident: f64,
+}
+
+impl Growth {
+    fn is_leak(&self) -> bool {
+        self.allocated.map_or(self.resident > LEAK[1], |growth| growth > LEAK[0])
+    }
 }
 
 impl Cycle {
@@ -75,8 +110,8 @@ pub fn soak(seconds: f64, json: bool) -> Result<ExitCode> {
                 let index = (record.time / cycle_time) as usize;
                 while cycles.len() <= index {
                     cycles.push(Cycle::default());
-                    if let (Some(cycle), Some(memory)) = (cycles.last_mut(), resident_bytes()) {
-                        cycle.memory = memory as f64;
+                    if let Some(cycle) = cycles.last_mut() {
+                        cycle.memory = Memory::now();
                     }
                 }
                 cycles[index].add(record);
@@ -90,7 +125,6 @@ pub fn soak(seconds: f64, json: bool) -> Result<ExitCode> {
         bar.set_position(last_time as u64);
     }
     bar.finish_and_clear();
-    let memory_end = resident_bytes().unwrap_or(0) as f64;
     let finished = running.stop();
     if !finished.end.is_regular() {
         bail!("the session ended early: {}", finished.end);
@@ -109,19 +143,19 @@ pub fn soak(seconds: f64, json: bool) -> Result<ExitCode> {
         bail!("stopped before the third cycle; nothing to compare");
     }
     let (early, late) = (cycles[1], cycles[cycles.len() - 1]);
-    let growth = memory_end - early.memory;
+    let growth = late.memory.growth(early.memory);
     let force_drift = late.mean_force() / early.mean_force() - 1.0;
     let clock_drift = (seen_at - started) as f64 * 1e-9 - last_time;
-    let good = growth < LEAK && force_drift.abs() < DRIFT && clock_drift.abs() < CLOCK_DRIFT;
+    let good = !growth.is_leak() && force_drift.abs() < DRIFT && clock_drift.abs() < CLOCK_DRIFT;
     let mean_us = |total: u64, c: &Cycle| total as f64 * 1e-3 / c.ticks.max(1) as f64;
     if json {
         let value = json!({
             "seconds": last_time,
             "cycles": cycles.len(),
-            "memory_after_one_cycle": early.memory,
-            "memory_at_the_end": memory_end,
-            "growth_bytes": growth,
-            "memory_by_cycle": cycles.iter().map(|c| c.memory).collect::<Vec<f64>>(),
+            "allocated_by_cycle": cycles.iter().map(|c| c.memory.allocated).collect::<Vec<_>>(),
+            "allocated_growth_bytes": growth.allocated,
+            "resident_by_cycle": cycles.iter().map(|c| c.memory.resident).collect::<Vec<_>>(),
+            "resident_growth_bytes": growth.resident,
             "mean_force_second_cycle": early.mean_force(),
             "mean_force_last_cycle": late.mean_force(),
             "force_drift": force_drift,
@@ -144,12 +178,21 @@ pub fn soak(seconds: f64, json: bool) -> Result<ExitCode> {
             finished.timing.lateness.share_up_to(50_000) * 100.0,
             finished.timing.lateness.quantile_ns(0.999) as f64 * 1e-3
         )?;
+        let mib = |bytes: u64| bytes as f64 / 1_048_576.0;
+        let (first, last) = (early.memory, late.memory);
+        if let (Some(then), Some(now), Some(growth)) = (first.allocated, last.allocated, growth.allocated) {
+            let (then, now, growth) = (mib(then), mib(now), growth / 1024.0);
+            writeln!(
+                out,
+                "  allocated {then:.2} MiB after the first cycle, {now:.2} MiB before the last: {growth:+.1} KiB"
+            )?;
+        }
         writeln!(
             out,
-            "  memory {:.2} MiB after the first cycle, {:.2} MiB at the end: {:+.0} KiB",
-            early.memory / 1048576.0,
-            memory_end / 1048576.0,
-            growth / 1024.0
+            "  in RAM {:.2} MiB and then {:.2} MiB: {:+.0} KiB",
+            mib(first.resident),
+            mib(last.resident),
+            growth.resident / 1024.0
         )?;
         writeln!(
             out,
