@@ -4,6 +4,7 @@ use super::Pair;
 use super::kernel::{self, Box32};
 use crate::surface::{EMPTY, LANES, LEAF, Leaf, Node, Surface};
 use crate::vector::{Rigid, Vec3, norm};
+use fearless_simd::Simd;
 
 /// A leaf with the leaves of the other surface that come close to it, a range of a list.
 #[derive(Clone, Copy, Debug)]
@@ -40,8 +41,8 @@ struct Frame {
 }
 
 /// Finds all pairs of leaves that may be closer than `reach`.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-pub(super) fn walk(pair: Pair<'_>, reach: f64, walk: &mut Walk) {
+#[inline(always)]
+pub(super) fn walk<S: Simd>(simd: S, pair: Pair<'_>, reach: f64, walk: &mut Walk) {
     walk.body.of.clear();
     walk.body.near.clear();
     walk.candidates.clear();
@@ -62,7 +63,7 @@ pub(super) fn walk(pair: Pair<'_>, reach: f64, walk: &mut Walk) {
                 continue;
             }
             let begin = walk.candidates.len() as u32;
-            refine(pair.obstacle, walk, frame, &boxes[lane], child & LEAF != 0);
+            refine(simd, pair.obstacle, walk, frame, &boxes[lane], child & LEAF != 0);
             let end = walk.candidates.len() as u32;
             if begin == end {
                 continue;
@@ -70,7 +71,7 @@ pub(super) fn walk(pair: Pair<'_>, reach: f64, walk: &mut Walk) {
             if child & LEAF == 0 {
                 walk.stack.push(Frame { node: child, begin, end });
             } else {
-                meet_leaf(pair, walk, child & !LEAF, begin as usize, margin);
+                meet_leaf(simd, pair, walk, child & !LEAF, begin as usize, margin);
                 walk.candidates.truncate(begin as usize);
             }
         }
@@ -80,7 +81,7 @@ pub(super) fn walk(pair: Pair<'_>, reach: f64, walk: &mut Walk) {
 
 /// Appends to the candidates those of the frame that overlap `b`, opened down to about its size or, for a leaf, to leaves.
 #[inline(always)]
-fn refine(obstacle: &Surface, walk: &mut Walk, frame: Frame, b: &Box32, to_leaves: bool) {
+fn refine<S: Simd>(simd: S, obstacle: &Surface, walk: &mut Walk, frame: Frame, b: &Box32, to_leaves: bool) {
     let extent = b.extent();
     for i in frame.begin..frame.end {
         let candidate = walk.candidates[i as usize];
@@ -95,7 +96,7 @@ fn refine(obstacle: &Surface, walk: &mut Walk, frame: Frame, b: &Box32, to_leave
         walk.pending.push(candidate);
         while let Some(open) = walk.pending.pop() {
             let node = &obstacle.nodes[open as usize];
-            let mut mask = kernel::overlapping_children(node, b);
+            let mut mask = kernel::overlapping_children(simd, node, b);
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize;
                 mask &= mask - 1;
@@ -117,9 +118,9 @@ fn child_extent(node: &Node, lane: usize) -> f32 {
 
 /// Keeps the candidates that may come within the margin of a leaf of the body.
 #[inline(always)]
-fn meet_leaf(pair: Pair<'_>, walk: &mut Walk, index: u32, begin: usize, margin: f32) {
+fn meet_leaf<S: Simd>(simd: S, pair: Pair<'_>, walk: &mut Walk, index: u32, begin: usize, margin: f32) {
     let leaf = &pair.body.leaves[index as usize];
-    let grown = kernel::moved_block_box(&pair.body.blocks[index as usize], pair.motion, margin);
+    let grown = kernel::moved_block_box(simd, &pair.body.blocks[index as usize], pair.motion, margin);
     let slab = Slab::of(leaf, pair.motion);
     let first = walk.body.near.len() as u32;
     for i in begin..walk.candidates.len() {
