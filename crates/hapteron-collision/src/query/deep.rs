@@ -194,7 +194,7 @@ fn long_edges<S>(dive: &Dive<'_, S>, leaf: u32, side: &Side, memory: &mut Memory
     let mut spare = f64::INFINITY;
     for edge in surface.leaves[leaf as usize].first_edge..end {
         let vertices = surface.edges[edge as usize].vertices;
-        let known = vertices.map(|v| side.signed_distance(v));
+        let known = [side.signed_distance(vertices[0]), side.signed_distance(vertices[1])];
         if known.iter().all(|s| s.is_finite()) {
             spare = spare.min(dive.tolerance - known[0].max(known[1]));
             continue;

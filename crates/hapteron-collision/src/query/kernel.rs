@@ -13,7 +13,10 @@ pub(super) fn lanes<S: Simd>(simd: S, values: &[f32; LANES]) -> f32x8<S> {
 /// The same by axis.
 #[inline(always)]
 pub(super) fn lanes_of<S: Simd, const N: usize>(simd: S, values: &[[f32; LANES]; N]) -> [f32x8<S>; N] {
-    values.each_ref().map(|v| lanes(simd, v))
+    core::array::from_fn(
+        #[inline(always)]
+        |k| lanes(simd, &values[k]),
+    )
 }
 
 /// One bit a lane.
@@ -144,29 +147,59 @@ pub(super) fn moved_children(node: &Node, motion: &Rigid, margin: f32) -> [Box32
     result
 }
 
-/// The box around a block after a rigid motion, grown by `margin`.
-#[inline(always)]
-pub(super) fn moved_block_box<S: Simd>(simd: S, block: &TriangleBlock, motion: &Rigid, margin: f32) -> Box32 {
-    let origin = motion.point(block.origin.map(f64::from));
-    let mut result = Box32 { min: [0.0; 3], max: [0.0; 3] };
-    for row in 0..3 {
-        let r = motion.rotation[row].map(|c| c as f32);
-        let turned = |v: &[[f32; LANES]; 3]| {
-            let v = lanes_of(simd, v);
-            v[0] * r[0] + v[1] * r[1] + v[2] * r[2]
-        };
-        let (along, across) = (turned(&block.along), turned(&block.across));
-        let a = turned(&block.corner);
-        let b = a + along * lanes(simd, &block.length[0]);
-        let third = lanes(simd, &block.length[2]);
+/// The corners of a block's triangles, about a point, after a rigid motion.
+#[derive(Clone, Copy)]
+pub(super) struct Corners<S: Simd> {
+    /// By corner and axis.
+    at: [[f32x8<S>; 3]; 3],
+    about: [f32; 3],
+}
+
+impl<S: Simd> Corners<S> {
+    #[inline(always)]
+    pub(super) fn moved(simd: S, block: &TriangleBlock, motion: &Rigid) -> Self {
+        let about = motion.point(block.origin.map(f64::from)).map(|c| c as f32);
+        let (length, third) = (lanes(simd, &block.length[0]), lanes(simd, &block.length[2]));
         let (x, y) = (lanes(simd, &block.third[0]) * third, lanes(simd, &block.third[1]) * third);
-        let c = a + along * x + across * y;
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        let origin = origin[row] as f32;
-        result.min[row] = origin + low.reduce_min() - margin;
-        result.max[row] = origin + high.reduce_max() + margin;
+        let mut at = [[f32x8::splat(simd, 0.0); 3]; 3];
+        for row in 0..3 {
+            let r = motion.rotation[row].map(|c| c as f32);
+            let turned = |v: &[[f32; LANES]; 3]| {
+                lanes(simd, &v[0]) * r[0] + lanes(simd, &v[1]) * r[1] + lanes(simd, &v[2]) * r[2]
+            };
+            let (first, along, across) = (turned(&block.corner), turned(&block.along), turned(&block.across));
+            at[0][row] = first;
+            at[1][row] = first + along * length;
+            at[2][row] = first + along * x + across * y;
+        }
+        Self { at, about }
     }
-    result
+
+    /// The box around them, grown by `margin`.
+    #[inline(always)]
+    pub(super) fn bounds(&self, margin: f32) -> Box32 {
+        let mut result = Box32 { min: [0.0; 3], max: [0.0; 3] };
+        for k in 0..3 {
+            let (low, high) = self.range([self.at[0][k], self.at[1][k], self.at[2][k]]);
+            result.min[k] = self.about[k] + low - margin;
+            result.max[k] = self.about[k] + high + margin;
+        }
+        result
+    }
+
+    /// Between which heights they lie along a direction.
+    #[inline(always)]
+    pub(super) fn heights(&self, normal: [f32; 3]) -> (f32, f32) {
+        let about: f32 = (0..3).map(|k| self.about[k] * normal[k]).sum();
+        let height = |p: &[f32x8<S>; 3]| p[0] * normal[0] + p[1] * normal[1] + p[2] * normal[2];
+        let (low, high) = self.range([height(&self.at[0]), height(&self.at[1]), height(&self.at[2])]);
+        (about + low, about + high)
+    }
+
+    #[inline(always)]
+    fn range(&self, [a, b, c]: [f32x8<S>; 3]) -> (f32, f32) {
+        (a.min(b).min(c).reduce_min(), a.max(b).max(c).reduce_max())
+    }
 }
 
 /// Squared distances of a point (from the block's origin) to the triangles of a block.

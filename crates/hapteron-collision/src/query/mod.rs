@@ -110,14 +110,14 @@ impl QueryWorkspace {
             0.0
         };
         let reach = pair.tolerance + ahead;
-        walk::walk(simd, pair, reach, &mut self.walk);
+        walk::walk(simd, pair, ahead, &mut self.walk);
         let [body_apart, obstacle_apart] = self.deep.apart.each_mut();
         for (clear, neighbours) in [
-            (&mut self.body.clear, &self.walk.body),
-            (&mut self.obstacle.clear, &self.walk.obstacle),
-            (&mut self.ridges.clear, &self.walk.body),
-            (body_apart, &self.walk.body),
-            (obstacle_apart, &self.walk.obstacle),
+            (&mut self.body.clear, &self.walk.near.body),
+            (&mut self.obstacle.clear, &self.walk.near.obstacle),
+            (&mut self.ridges.clear, &self.walk.near.body),
+            (body_apart, &self.walk.touching.body),
+            (obstacle_apart, &self.walk.touching.obstacle),
         ] {
             clear.clear();
             clear.resize(neighbours.of.len(), side::Clear::UNKNOWN);
@@ -136,12 +136,13 @@ impl QueryWorkspace {
         body.clear();
         obstacle.clear();
         ridges.forget(pair.obstacle);
+        let (near, touching) = (&walk.near, &walk.touching);
         let mut sink = Sink { pair, world_from_obstacle, contacts, least: f64::INFINITY };
-        vertices::of_body(simd, pair, &walk.body, body, scratch, &mut sink);
-        vertices::of_obstacle(simd, pair, &walk.obstacle, obstacle, scratch, &mut sink);
-        ridges::find(simd, pair, &walk.body, [body, obstacle], ridges, &mut sink);
-        deep::of_body(simd, pair, &walk.body, body, deep, &mut sink);
-        deep::of_obstacle(simd, pair, &walk.obstacle, obstacle, deep, &mut sink);
+        vertices::of_body(simd, pair, &near.body, body, scratch, &mut sink);
+        vertices::of_obstacle(simd, pair, &near.obstacle, obstacle, scratch, &mut sink);
+        ridges::find(simd, pair, &near.body, [body, obstacle], ridges, &mut sink);
+        deep::of_body(simd, pair, &touching.body, body, deep, &mut sink);
+        deep::of_obstacle(simd, pair, &touching.obstacle, obstacle, deep, &mut sink);
         sink.least
     }
 }

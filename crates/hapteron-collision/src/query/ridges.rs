@@ -64,7 +64,9 @@ impl Ridges {
             if within <= 0.0 {
                 continue;
             }
-            let [a, b] = edge.vertices.map(|v| pair.motion.point(pair.body.vertices[v as usize]));
+            let [a, b] = edge.vertices;
+            let a = pair.motion.point(pair.body.vertices[a as usize]);
+            let b = pair.motion.point(pair.body.vertices[b as usize]);
             let outward = pair.motion.direction(edge.normal.map(f64::from));
             let cone = Cone::wide(outward.map(|c| c as f32), edge.cone);
             let lane = self.own.len() % LANES;
@@ -123,7 +125,8 @@ fn local(p: Vec3, origin: [f32; 3]) -> [f32; 3] {
 /// How close the middle of an edge must come to another edge to show more than its ends do; zero when an end lies inside.
 #[inline(always)]
 fn reach(edge: &Edge, side: &Side, pair: Pair<'_>, least: f64) -> f64 {
-    let [a, b] = edge.vertices.map(|v| side.signed_distance(v));
+    let [a, b] = edge.vertices;
+    let (a, b) = (side.signed_distance(a), side.signed_distance(b));
     let ends = a.min(b);
     if ends <= 0.0 {
         0.0
