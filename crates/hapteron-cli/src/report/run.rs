@@ -65,7 +65,7 @@ pub fn run(outcome: Outcome<'_>, notes: &[String]) -> Result<String> {
     }
     let pace = match &time {
         Time::Virtual { wall, .. } => {
-            (format!("{:.1} x", summary.duration / wall.max(1e-9)), "real time, computed")
+            (format!("{:.2} x", summary.duration / wall.max(1e-9)), "real time, computed")
         }
         Time::Real(live) => {
             let share = live.timing.lateness.share_up_to(50_000) * 100.0;

@@ -17,6 +17,7 @@ use super::vertices::{push_body_vertex, push_obstacle_vertex};
 use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{LANES, Surface};
 use crate::vector::{Rigid, Vec3, add, dot, norm, scale, sub};
+use fearless_simd::Simd;
 use std::ops::Range;
 
 /// Lists to be reused.
@@ -54,7 +55,8 @@ struct Probe {
 }
 
 /// One surface in the other one.
-struct Dive<'a> {
+struct Dive<'a, S> {
+    simd: S,
     own: &'a Surface,
     other: &'a Surface,
     /// From the own frame to the other's.
@@ -66,7 +68,7 @@ struct Dive<'a> {
     which: usize,
 }
 
-impl Dive<'_> {
+impl<S> Dive<'_, S> {
     /// The weight of a contact in the middle of an edge: it begins where the edge comes through the surface, where any other contact already
     /// presses, and must not begin with a blow.
     fn share(&self, foot: &Foot) -> f64 {
@@ -75,8 +77,9 @@ impl Dive<'_> {
 }
 
 /// Finds the vertices of the body that lie deeper in the obstacle than the tolerance, and makes their contacts.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-pub(super) fn of_body(
+#[inline(always)]
+pub(super) fn of_body<S: Simd>(
+    simd: S,
     pair: Pair<'_>,
     neighbours: &Neighbours,
     side: &mut Side,
@@ -84,7 +87,7 @@ pub(super) fn of_body(
     sink: &mut Sink<'_>,
 ) {
     let Pair { body: own, obstacle: other, motion, tolerance, travelled, .. } = pair;
-    let dive = Dive { own, other, motion, tolerance, travelled, slack: pair.slack() as f32, which: 0 };
+    let dive = Dive { simd, own, other, motion, tolerance, travelled, slack: pair.slack() as f32, which: 0 };
     let first = sink.contacts.len();
     run(&dive, neighbours, side, memory, |inside, foot| match inside {
         Inside::Vertex(vertex, point) => push_body_vertex(pair, vertex, point, foot, sink),
@@ -103,8 +106,9 @@ pub(super) fn of_body(
 }
 
 /// The same for the vertices of the obstacle in the body.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-pub(super) fn of_obstacle(
+#[inline(always)]
+pub(super) fn of_obstacle<S: Simd>(
+    simd: S,
     pair: Pair<'_>,
     neighbours: &Neighbours,
     side: &mut Side,
@@ -112,7 +116,7 @@ pub(super) fn of_obstacle(
     sink: &mut Sink<'_>,
 ) {
     let Pair { body: other, obstacle: own, inverse: motion, tolerance, travelled, .. } = pair;
-    let dive = Dive { own, other, motion, tolerance, travelled, slack: pair.slack() as f32, which: 1 };
+    let dive = Dive { simd, own, other, motion, tolerance, travelled, slack: pair.slack() as f32, which: 1 };
     let first = sink.contacts.len();
     run(&dive, neighbours, side, memory, |inside, foot| match inside {
         Inside::Vertex(vertex, _) => push_obstacle_vertex(pair, vertex, foot, sink),
@@ -131,8 +135,8 @@ pub(super) fn of_obstacle(
 }
 
 #[inline(always)]
-fn run(
-    dive: &Dive<'_>,
+fn run<S: Simd>(
+    dive: &Dive<'_, S>,
     neighbours: &Neighbours,
     side: &mut Side,
     memory: &mut Memory,
@@ -181,7 +185,7 @@ fn length(surface: &Surface, edge: u32) -> f64 {
 /// Collects the edges of a leaf with an end that is far, if they may run through a face. A known end is as far from there as it is from the
 /// surface, any other one farther than the tolerance: only what is left between is looked at. Gives how much the others lack.
 #[inline(always)]
-fn long_edges(dive: &Dive<'_>, leaf: u32, side: &Side, memory: &mut Memory) -> f64 {
+fn long_edges<S>(dive: &Dive<'_, S>, leaf: u32, side: &Side, memory: &mut Memory) -> f64 {
     let surface = dive.own;
     let next = surface.leaves.get(leaf as usize + 1);
     let end = next.map_or(surface.edges.len() as u32, |next| next.first_edge);
@@ -190,7 +194,7 @@ fn long_edges(dive: &Dive<'_>, leaf: u32, side: &Side, memory: &mut Memory) -> f
     let mut spare = f64::INFINITY;
     for edge in surface.leaves[leaf as usize].first_edge..end {
         let vertices = surface.edges[edge as usize].vertices;
-        let known = vertices.map(|v| side.signed_distance(v));
+        let known = [side.signed_distance(vertices[0]), side.signed_distance(vertices[1])];
         if known.iter().all(|s| s.is_finite()) {
             spare = spare.min(dive.tolerance - known[0].max(known[1]));
             continue;
@@ -222,7 +226,7 @@ fn long_edges(dive: &Dive<'_>, leaf: u32, side: &Side, memory: &mut Memory) -> f
 /// Finds where the collected edges run through triangles of the near leaves, in the order of the edges. Gives how far away at least any of
 /// them is from any leaf.
 #[inline(always)]
-fn cross_leaves(dive: &Dive<'_>, near: &[u32], memory: &mut Memory) -> f32 {
+fn cross_leaves<S: Simd>(dive: &Dive<'_, S>, near: &[u32], memory: &mut Memory) -> f32 {
     memory.crossings.clear();
     let mut apart = f32::INFINITY;
     if memory.probes.is_empty() {
@@ -231,7 +235,7 @@ fn cross_leaves(dive: &Dive<'_>, near: &[u32], memory: &mut Memory) -> f32 {
     for &index in near {
         let leaf = &dive.other.leaves[index as usize];
         for (eight, block) in memory.segments.iter().enumerate() {
-            let (_, mut mask, closest) = block.near(leaf, dive.slack);
+            let (_, mut mask, closest) = block.near(dive.simd, leaf, dive.slack);
             apart = if closest < apart { closest } else { apart };
             while mask != 0 {
                 let probe = &memory.probes[eight * LANES + mask.trailing_zeros() as usize];
@@ -245,11 +249,11 @@ fn cross_leaves(dive: &Dive<'_>, near: &[u32], memory: &mut Memory) -> f32 {
 }
 
 #[inline(always)]
-fn cross_leaf(dive: &Dive<'_>, probe: &Probe, index: u32, found: &mut Vec<(u32, f64)>) {
+fn cross_leaf<S: Simd>(dive: &Dive<'_, S>, probe: &Probe, index: u32, found: &mut Vec<(u32, f64)>) {
     let (leaf, block) = (&dive.other.leaves[index as usize], &dive.other.blocks[index as usize]);
     let from = sub(probe.start, block.origin.map(f64::from));
     let ends = probe.part.map(|share| add(from, scale(probe.along, share)).map(|c| c as f32));
-    let mut mask = kernel::pierced_triangles(ends, block) & ((1 << leaf.triangles) - 1);
+    let mut mask = kernel::pierced_triangles(dive.simd, ends, block) & ((1 << leaf.triangles) - 1);
     while mask != 0 {
         let triangle = leaf.first_triangle + mask.trailing_zeros();
         mask &= mask - 1;
@@ -260,8 +264,8 @@ fn cross_leaf(dive: &Dive<'_>, probe: &Probe, index: u32, found: &mut Vec<(u32, 
 
 /// Looks where the ends of an edge lie that runs through faces, as far as that is not known from the number of faces.
 #[inline(always)]
-fn follow(
-    dive: &Dive<'_>,
+fn follow<S: Simd>(
+    dive: &Dive<'_, S>,
     edge: u32,
     crossings: Range<usize>,
     side: &mut Side,
@@ -290,8 +294,8 @@ fn follow(
 
 /// Looks where a vertex lies, unless that is known, and tells whether it is inside; `within` is no less than its distance.
 #[inline(always)]
-fn look(
-    dive: &Dive<'_>,
+fn look<S: Simd>(
+    dive: &Dive<'_, S>,
     vertex: u32,
     within: f64,
     side: &mut Side,
@@ -303,7 +307,7 @@ fn look(
         return known < 0.0;
     }
     let point = dive.motion.point(dive.own.vertices[vertex as usize]);
-    let Some((triangle, foot)) = memory.nearest.foot(dive.other, point, within, dive.slack) else {
+    let Some((triangle, foot)) = memory.nearest.foot(dive.simd, dive.other, point, within, dive.slack) else {
         return false;
     };
     // Outside is remembered as well, so that no vertex is looked at twice.
@@ -318,8 +322,8 @@ fn look(
 
 /// An edge that goes in and comes out again has its middle inside and no end that shows it.
 #[inline(always)]
-fn between_crossings(
-    dive: &Dive<'_>,
+fn between_crossings<S: Simd>(
+    dive: &Dive<'_, S>,
     edge: u32,
     crossings: Range<usize>,
     memory: &mut Memory,
@@ -331,7 +335,7 @@ fn between_crossings(
         let (from, to) = (pair[0].1, pair[1].1);
         let point = dive.motion.point(add(a, scale(sub(b, a), 0.5 * (from + to))));
         let within = (to - from) * length;
-        if let Some((_, foot)) = memory.nearest.foot(dive.other, point, within, dive.slack)
+        if let Some((_, foot)) = memory.nearest.foot(dive.simd, dive.other, point, within, dive.slack)
             && foot.signed_distance < 0.0
         {
             push(Inside::Edge(edge, point), &foot);

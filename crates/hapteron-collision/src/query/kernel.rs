@@ -2,12 +2,27 @@
 
 use crate::surface::{ERROR, LANES, Node, Surface, TriangleBlock};
 use crate::vector::Rigid;
-use wide::f32x8;
+use fearless_simd::{Level, Simd, dispatch, f32x8, mask32x8, prelude::*};
 
-/// Eight numbers to calculate with.
+/// Eight numbers to calculate with, by the instructions that `simd` stands for.
 #[inline(always)]
-pub(super) fn lanes(values: [f32; LANES]) -> f32x8 {
-    f32x8::new(values)
+pub(super) fn lanes<S: Simd>(simd: S, values: &[f32; LANES]) -> f32x8<S> {
+    f32x8::load_array_ref(simd, values)
+}
+
+/// The same by axis.
+#[inline(always)]
+pub(super) fn lanes_of<S: Simd, const N: usize>(simd: S, values: &[[f32; LANES]; N]) -> [f32x8<S>; N] {
+    core::array::from_fn(
+        #[inline(always)]
+        |k| lanes(simd, &values[k]),
+    )
+}
+
+/// One bit a lane.
+#[inline(always)]
+pub(super) fn bits<S: Simd>(mask: mask32x8<S>) -> u32 {
+    mask.to_bitmask() as u32
 }
 
 /// An axis-aligned box in single precision, rounded outward.
@@ -71,42 +86,41 @@ impl LeafBounds {
 
     /// Lower bounds of the squared distances of a point to the leaves.
     #[inline(always)]
-    pub(super) fn lower(&self, p: [f32; 3], slack: f32) -> [f32; LANES] {
-        let slack = f32x8::splat(slack);
-        let (mut sum, mut height) = (f32x8::ZERO, f32x8::ZERO);
+    pub(super) fn lower<S: Simd>(&self, simd: S, p: [f32; 3], slack: f32) -> f32x8<S> {
+        let zero = f32x8::splat(simd, 0.0);
+        let (mut sum, mut height) = (zero, zero);
         for (k, &c) in p.iter().enumerate() {
-            let c = f32x8::splat(c);
-            let (under, over) = (lanes(self.min[k]) - c, c - lanes(self.max[k]));
-            let beyond = (under.fast_max(over) - slack).fast_max(f32x8::ZERO);
+            let c = f32x8::splat(simd, c);
+            let (under, over) = (lanes(simd, &self.min[k]) - c, c - lanes(simd, &self.max[k]));
+            let beyond = (under.max(over) - slack).max(zero);
             sum += beyond * beyond;
-            height += lanes(self.normal[k]) * c;
+            height += lanes(simd, &self.normal[k]) * c;
         }
-        let (under, over) = (lanes(self.low) - height, height - lanes(self.high));
-        let beyond = (under.fast_max(over) - slack).fast_max(f32x8::ZERO);
-        (beyond * beyond).fast_max(sum).to_array()
+        let (under, over) = (lanes(simd, &self.low) - height, height - lanes(simd, &self.high));
+        let beyond = (under.max(over) - slack).max(zero);
+        (beyond * beyond).max(sum)
     }
 }
 
 /// Bit `i` is set when child `i` of the node overlaps the box.
 #[inline(always)]
-pub(super) fn overlapping_children(node: &Node, b: &Box32) -> u32 {
-    let (mut low, mut high) = (f32x8::ZERO, f32x8::ZERO);
+pub(super) fn overlapping_children<S: Simd>(simd: S, node: &Node, b: &Box32) -> u32 {
+    let mut apart = mask32x8::splat(simd, false);
     for k in 0..3 {
-        low |= lanes(node.min[k]).simd_gt(f32x8::splat(b.max[k]));
-        high |= lanes(node.max[k]).simd_lt(f32x8::splat(b.min[k]));
+        apart |= lanes(simd, &node.min[k]).simd_gt(b.max[k]);
+        apart |= lanes(simd, &node.max[k]).simd_lt(b.min[k]);
     }
-    !(low | high).to_bitmask() & 0xff
+    bits(!apart)
 }
 
 /// Lower bounds of the squared distances of a point to a node's children.
 #[inline(always)]
-pub(super) fn children_squared(node: &Node, p: [f32; 3], slack: f32) -> [f32; LANES] {
-    let slack = f32x8::splat(slack);
-    let mut sum = f32x8::ZERO;
+pub(super) fn children_squared<S: Simd>(simd: S, node: &Node, p: [f32; 3], slack: f32) -> [f32; LANES] {
+    let zero = f32x8::splat(simd, 0.0);
+    let mut sum = zero;
     for (k, &c) in p.iter().enumerate() {
-        let c = f32x8::splat(c);
-        let (under, over) = (lanes(node.min[k]) - c, c - lanes(node.max[k]));
-        let beyond = (under.fast_max(over) - slack).fast_max(f32x8::ZERO);
+        let (under, over) = (lanes(simd, &node.min[k]) - c, c - lanes(simd, &node.max[k]));
+        let beyond = (under.max(over) - slack).max(zero);
         sum += beyond * beyond;
     }
     sum.to_array()
@@ -133,65 +147,97 @@ pub(super) fn moved_children(node: &Node, motion: &Rigid, margin: f32) -> [Box32
     result
 }
 
-/// The box around a block after a rigid motion, grown by `margin`.
-#[inline(always)]
-pub(super) fn moved_block_box(block: &TriangleBlock, motion: &Rigid, margin: f32) -> Box32 {
-    let origin = motion.point(block.origin.map(f64::from));
-    let mut result = Box32 { min: [0.0; 3], max: [0.0; 3] };
-    for row in 0..3 {
-        let r = motion.rotation[row].map(|c| c as f32);
-        let turned = |v: &[[f32; LANES]; 3]| {
-            f32x8::splat(r[0]) * lanes(v[0])
-                + f32x8::splat(r[1]) * lanes(v[1])
-                + f32x8::splat(r[2]) * lanes(v[2])
-        };
-        let (along, across) = (turned(&block.along), turned(&block.across));
-        let a = turned(&block.corner);
-        let b = a + along * lanes(block.length[0]);
-        let third = lanes(block.length[2]);
-        let (x, y) = (lanes(block.third[0]) * third, lanes(block.third[1]) * third);
-        let c = a + along * x + across * y;
-        let low = a.fast_min(b).fast_min(c).to_array();
-        let high = a.fast_max(b).fast_max(c);
-        let origin = origin[row] as f32;
-        result.min[row] = origin + least(&low) - margin;
-        result.max[row] = origin - least(&(-high).to_array()) + margin;
+/// The corners of a block's triangles, about a point, after a rigid motion.
+#[derive(Clone, Copy)]
+pub(super) struct Corners<S: Simd> {
+    /// By corner and axis.
+    at: [[f32x8<S>; 3]; 3],
+    about: [f32; 3],
+}
+
+impl<S: Simd> Corners<S> {
+    #[inline(always)]
+    pub(super) fn moved(simd: S, block: &TriangleBlock, motion: &Rigid) -> Self {
+        let about = motion.point(block.origin.map(f64::from)).map(|c| c as f32);
+        let (length, third) = (lanes(simd, &block.length[0]), lanes(simd, &block.length[2]));
+        let (x, y) = (lanes(simd, &block.third[0]) * third, lanes(simd, &block.third[1]) * third);
+        let mut at = [[f32x8::splat(simd, 0.0); 3]; 3];
+        for row in 0..3 {
+            let r = motion.rotation[row].map(|c| c as f32);
+            let turned = |v: &[[f32; LANES]; 3]| {
+                lanes(simd, &v[0]) * r[0] + lanes(simd, &v[1]) * r[1] + lanes(simd, &v[2]) * r[2]
+            };
+            let (first, along, across) = (turned(&block.corner), turned(&block.along), turned(&block.across));
+            at[0][row] = first;
+            at[1][row] = first + along * length;
+            at[2][row] = first + along * x + across * y;
+        }
+        Self { at, about }
     }
-    result
+
+    /// The box around them, grown by `margin`.
+    #[inline(always)]
+    pub(super) fn bounds(&self, margin: f32) -> Box32 {
+        let mut result = Box32 { min: [0.0; 3], max: [0.0; 3] };
+        for k in 0..3 {
+            let (low, high) = self.range([self.at[0][k], self.at[1][k], self.at[2][k]]);
+            result.min[k] = self.about[k] + low - margin;
+            result.max[k] = self.about[k] + high + margin;
+        }
+        result
+    }
+
+    /// Between which heights they lie along a direction.
+    #[inline(always)]
+    pub(super) fn heights(&self, normal: [f32; 3]) -> (f32, f32) {
+        let about: f32 = (0..3).map(|k| self.about[k] * normal[k]).sum();
+        let height = |p: &[f32x8<S>; 3]| p[0] * normal[0] + p[1] * normal[1] + p[2] * normal[2];
+        let (low, high) = self.range([height(&self.at[0]), height(&self.at[1]), height(&self.at[2])]);
+        (about + low, about + high)
+    }
+
+    #[inline(always)]
+    fn range(&self, [a, b, c]: [f32x8<S>; 3]) -> (f32, f32) {
+        (a.min(b).min(c).reduce_min(), a.max(b).max(c).reduce_max())
+    }
 }
 
 /// Squared distances of a point (from the block's origin) to the triangles of a block.
 #[inline(always)]
-pub(crate) fn point_triangles(p: [f32; 3], b: &TriangleBlock) -> [f32; LANES] {
-    let q = [0, 1, 2].map(|k| f32x8::splat(p[k]) - lanes(b.corner[k]));
-    let part =
-        |axis: &[[f32; LANES]; 3]| lanes(axis[0]) * q[0] + lanes(axis[1]) * q[1] + lanes(axis[2]) * q[2];
+pub(super) fn squared_distances<S: Simd>(simd: S, p: [f32; 3], b: &TriangleBlock) -> f32x8<S> {
+    let q = [0, 1, 2].map(|k| f32x8::splat(simd, p[k]) - lanes(simd, &b.corner[k]));
+    let part = |axis: &[[f32; LANES]; 3]| {
+        let axis = lanes_of(simd, axis);
+        axis[0] * q[0] + axis[1] * q[1] + axis[2] * q[2]
+    };
     let (x, y, z) = (part(&b.along), part(&b.across), part(&b.normal));
-    let length = b.length.map(lanes);
+    let length = lanes_of(simd, &b.length);
     let beyond = x - length[0];
-    let (u, v) = (b.second.map(lanes), b.third.map(lanes));
+    let (u, v) = (lanes_of(simd, &b.second), lanes_of(simd, &b.third));
     let (along2, across2) = (u[0] * beyond + u[1] * y, u[1] * beyond - u[0] * y);
     let (along3, across3) = (v[0] * x + v[1] * y, v[0] * y - v[1] * x);
     let side1 = beside(x, length[0], y);
     let side2 = beside(along2, length[1], across2);
     let side3 = beside(along3, length[2], across3);
-    let sides = side1.fast_min(side2).fast_min(side3);
-    let over = y.simd_ge(f32x8::ZERO) & across2.simd_le(f32x8::ZERO) & across3.simd_le(f32x8::ZERO);
-    (z * z + over.bitselect(f32x8::ZERO, sides)).to_array()
+    let sides = side1.min(side2).min(side3);
+    let over = y.simd_ge(0.0) & across2.simd_le(0.0) & across3.simd_le(0.0);
+    z * z + over.select(f32x8::splat(simd, 0.0), sides)
 }
 
 /// Bit `i` is set when the segment between two points (from the block's origin) may run through triangle `i` of a block.
 #[inline(always)]
-pub(super) fn pierced_triangles([p, q]: [[f32; 3]; 2], b: &TriangleBlock) -> u32 {
+pub(super) fn pierced_triangles<S: Simd>(simd: S, [p, q]: [[f32; 3]; 2], b: &TriangleBlock) -> u32 {
     let reach: f32 = (0..3).map(|k| p[k].abs() + q[k].abs()).sum();
-    let error = f32x8::splat(b.error + ERROR * reach);
-    let [from, to] = [p, q].map(|p| [0, 1, 2].map(|k| f32x8::splat(p[k]) - lanes(b.corner[k])));
-    let part = |axis: &[[f32; LANES]; 3], p: &[f32x8; 3]| {
-        lanes(axis[0]) * p[0] + lanes(axis[1]) * p[1] + lanes(axis[2]) * p[2]
+    let error = f32x8::splat(simd, b.error + ERROR * reach);
+    let corner = lanes_of(simd, &b.corner);
+    let [from, to] = [p, q].map(|p| [0, 1, 2].map(|k| f32x8::splat(simd, p[k]) - corner[k]));
+    let part = |axis: &[[f32; LANES]; 3], p: &[f32x8<S>; 3]| {
+        let axis = lanes_of(simd, axis);
+        axis[0] * p[0] + axis[1] * p[1] + axis[2] * p[2]
     };
     let (z, to_z) = (part(&b.normal, &from), part(&b.normal, &to));
-    let apart = z.fast_min(to_z).simd_gt(error) | z.fast_max(to_z).simd_lt(-error);
-    if apart.all() {
+    let apart = z.min(to_z).simd_gt(error) | z.max(to_z).simd_lt(-error);
+    if apart.all_true() {
         return 0;
     }
     let (x, y) = (part(&b.along, &from), part(&b.across, &from));
@@ -201,18 +247,24 @@ pub(super) fn pierced_triangles([p, q]: [[f32; 3]; 2], b: &TriangleBlock) -> u32
     let doubled = error + error;
     let margin = doubled + doubled / dz.abs() * (dx.abs() + dy.abs() + dz.abs());
     let (x, y) = (x + share * dx, y + share * dy);
-    let (u, v) = (b.second.map(lanes), b.third.map(lanes));
-    let across2 = u[1] * (x - lanes(b.length[0])) - u[0] * y;
+    let (u, v) = (lanes_of(simd, &b.second), lanes_of(simd, &b.third));
+    let across2 = u[1] * (x - lanes(simd, &b.length[0])) - u[0] * y;
     let across3 = v[0] * y - v[1] * x;
     let beside = y.simd_lt(-margin) | across2.simd_gt(margin) | across3.simd_gt(margin);
-    !(apart | beside).to_bitmask() & 0xff
+    bits(!(apart | beside))
 }
 
 /// Squared distance in the plane to a side, from the coordinates along and across it.
 #[inline(always)]
-fn beside(along: f32x8, length: f32x8, across: f32x8) -> f32x8 {
-    let beyond = (-along).fast_max(along - length).fast_max(f32x8::ZERO);
+fn beside<S: Simd>(along: f32x8<S>, length: f32x8<S>, across: f32x8<S>) -> f32x8<S> {
+    let beyond = (-along).max(along - length).max(0.0);
     beyond * beyond + across * across
+}
+
+/// [`squared_distances`] for callers without lanes of their own.
+#[inline(always)]
+pub(crate) fn point_triangles(p: [f32; 3], b: &TriangleBlock) -> [f32; LANES] {
+    dispatch!(Level::baseline(), simd => squared_distances(simd, p, b).to_array())
 }
 
 /// The least of eight.
@@ -226,16 +278,10 @@ pub(crate) fn least(values: &[f32; LANES]) -> f32 {
     lesser(lesser(half[0], half[2]), lesser(half[1], half[3]))
 }
 
-/// Bit `i` is set when value `i` is below `limit`.
-#[inline(always)]
-pub(super) fn below(values: &[f32; LANES], limit: f32) -> u32 {
-    lanes(*values).simd_lt(f32x8::splat(limit)).to_bitmask()
-}
-
 /// Bit `i` is set when value `i` is at most `limit`.
 #[inline(always)]
 pub(crate) fn at_most(values: &[f32; LANES], limit: f32) -> u32 {
-    lanes(*values).simd_le(f32x8::splat(limit)).to_bitmask()
+    dispatch!(Level::baseline(), simd => bits(lanes(simd, values).simd_le(limit)))
 }
 
 #[cfg(test)]
@@ -269,7 +315,10 @@ mod tests {
             for _ in 0..20 {
                 let p = a.map(|x| x + 1.5 * size * number());
                 let local = [0, 1, 2].map(|k| (p[k] - f64::from(block.origin[k])) as f32);
-                let found = f64::from(least(&point_triangles(local, block)).sqrt());
+                let squared =
+                    dispatch!(Level::new(), simd => squared_distances(simd, local, block).to_array());
+                assert_eq!(squared, point_triangles(local, block), "the same bits by all instructions");
+                let found = f64::from(least(&squared).sqrt());
                 let exact = feature::foot(p, leaf.triangle(0), &surface).signed_distance.abs();
                 let error = f64::from(block.error) + f64::from(crate::surface::ERROR) * exact;
                 assert!((found - exact).abs() <= error, "{found} {exact} {error} {thin} {size}");
@@ -307,7 +356,8 @@ mod tests {
                 let d = [0, 1, 2].map(|k| u * (b[k] - a[k]) + v * (c[k] - a[k]) + graze * size * number());
                 let p = [0, 1, 2].map(|k| through[k] - 0.5 * d[k]);
                 let local = |p: [f64; 3]| [0, 1, 2].map(|k| (p[k] - f64::from(block.origin[k])) as f32);
-                let mask = pierced_triangles([local(p), local(crate::vector::add(p, d))], block) & 1;
+                let ends = [local(p), local(crate::vector::add(p, d))];
+                let mask = dispatch!(Level::new(), simd => pierced_triangles(simd, ends, block)) & 1;
                 let exact = crate::query::ridges::pierces(p, d, [a, b, c]).is_some();
                 assert!(mask == 1 || !exact, "{round} {graze}");
                 pierced += u32::from(exact);

@@ -21,6 +21,7 @@ mod walk;
 use crate::contact::Contact;
 use crate::surface::Surface;
 use crate::vector::{self, Rigid};
+use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::Isometry3;
 use result::Sink;
 use walk::Walk;
@@ -83,7 +84,7 @@ impl QueryWorkspace {
     }
 
     /// Makes sure that the lists of near leaves hold all that can be within the tolerance. Gives what the body has travelled.
-    fn collect(&mut self, pair: Pair<'_>) -> f64 {
+    fn collect(&mut self, simd: impl Simd, pair: Pair<'_>) -> f64 {
         let surfaces = [pair.body.identity, pair.obstacle.identity];
         let Some(root) = pair.body.nodes.first() else {
             return 0.0;
@@ -109,14 +110,14 @@ impl QueryWorkspace {
             0.0
         };
         let reach = pair.tolerance + ahead;
-        walk::walk(pair, reach, &mut self.walk);
+        walk::walk(simd, pair, ahead, &mut self.walk);
         let [body_apart, obstacle_apart] = self.deep.apart.each_mut();
         for (clear, neighbours) in [
-            (&mut self.body.clear, &self.walk.body),
-            (&mut self.obstacle.clear, &self.walk.obstacle),
-            (&mut self.ridges.clear, &self.walk.body),
-            (body_apart, &self.walk.body),
-            (obstacle_apart, &self.walk.obstacle),
+            (&mut self.body.clear, &self.walk.near.body),
+            (&mut self.obstacle.clear, &self.walk.near.obstacle),
+            (&mut self.ridges.clear, &self.walk.near.body),
+            (body_apart, &self.walk.touching.body),
+            (obstacle_apart, &self.walk.touching.obstacle),
         ] {
             clear.clear();
             clear.resize(neighbours.of.len(), side::Clear::UNKNOWN);
@@ -124,6 +125,25 @@ impl QueryWorkspace {
         let motion = *pair.motion;
         self.collected = Some(Collected { surfaces, motion, reach, last: motion, travelled });
         travelled
+    }
+
+    /// Finds all contacts and gives the least distance.
+    #[inline(always)]
+    fn run<S: Simd>(&mut self, simd: S, pair: &mut Pair<'_>, world_from_obstacle: Rigid) -> f64 {
+        pair.travelled = self.collect(simd, *pair);
+        let pair = *pair;
+        let Self { walk, ridges, deep, body, obstacle, scratch, contacts, .. } = self;
+        body.clear();
+        obstacle.clear();
+        ridges.forget(pair.obstacle);
+        let (near, touching) = (&walk.near, &walk.touching);
+        let mut sink = Sink { pair, world_from_obstacle, contacts, least: f64::INFINITY };
+        vertices::of_body(simd, pair, &near.body, body, scratch, &mut sink);
+        vertices::of_obstacle(simd, pair, &near.obstacle, obstacle, scratch, &mut sink);
+        ridges::find(simd, pair, &near.body, [body, obstacle], ridges, &mut sink);
+        deep::of_body(simd, pair, &touching.body, body, deep, &mut sink);
+        deep::of_obstacle(simd, pair, &touching.obstacle, obstacle, deep, &mut sink);
+        sink.least
     }
 }
 
@@ -160,28 +180,8 @@ pub fn query<'a>(
     let motion = Rigid::from_isometry(&relative);
     let inverse = Rigid::from_isometry(&relative.inverse());
     let mut pair = Pair { body, obstacle, motion: &motion, inverse: &inverse, tolerance, travelled: 0.0 };
-    pair.travelled = workspace.collect(pair);
-    let QueryWorkspace {
-        walk,
-        ridges,
-        deep,
-        body: body_side,
-        obstacle: obstacle_side,
-        scratch,
-        contacts,
-        ..
-    } = workspace;
-    body_side.clear();
-    obstacle_side.clear();
-    ridges.forget(obstacle);
     let world_from_obstacle = Rigid::from_isometry(world_from_obstacle);
-    let mut sink = Sink { pair, world_from_obstacle, contacts, least: f64::INFINITY };
-    vertices::of_body(pair, &walk.body, body_side, scratch, &mut sink);
-    vertices::of_obstacle(pair, &walk.obstacle, obstacle_side, scratch, &mut sink);
-    ridges::find(pair, &walk.body, [body_side, obstacle_side], ridges, &mut sink);
-    deep::of_body(pair, &walk.body, body_side, deep, &mut sink);
-    deep::of_obstacle(pair, &walk.obstacle, obstacle_side, deep, &mut sink);
-    let min_distance = sink.least;
+    let min_distance = dispatch!(Level::new(), simd => workspace.run(simd, &mut pair, world_from_obstacle));
     QueryResult { min_distance, contacts: &workspace.contacts }
 }
 

@@ -4,6 +4,7 @@ use super::feature::{self, Foot};
 use super::kernel;
 use crate::surface::{EMPTY, ERROR, LEAF, Surface};
 use crate::vector::Vec3;
+use fearless_simd::{Simd, prelude::*};
 
 /// Covers the rounding of squares in single precision.
 const ROUNDING: f32 = 1.0 + 1e-6;
@@ -24,8 +25,9 @@ impl Nearest {
     /// The closest triangle (of equals the first) and the foot on it; none when it is farther than `within` metres. `slack` covers the
     /// rounding of single-precision coordinates.
     #[inline(always)]
-    pub(super) fn foot(
+    pub(super) fn foot<S: Simd>(
         &mut self,
+        simd: S,
         surface: &Surface,
         point: Vec3,
         within: f64,
@@ -43,11 +45,11 @@ impl Nearest {
                 continue;
             }
             if child & LEAF != 0 {
-                best.look(surface, point, child & !LEAF);
+                best.look(simd, surface, point, child & !LEAF);
                 continue;
             }
             let node = &surface.nodes[child as usize];
-            let squared = kernel::children_squared(node, point32, slack);
+            let squared = kernel::children_squared(simd, node, point32, slack);
             let first = self.stack.len();
             for (lane, &squared) in squared.iter().enumerate() {
                 if node.child[lane] != EMPTY && squared <= limit {
@@ -64,17 +66,17 @@ impl Nearest {
 impl Best {
     /// Looks at the triangles of a leaf that may be the closest, the likeliest first.
     #[inline(always)]
-    fn look(&mut self, surface: &Surface, point: Vec3, leaf: u32) {
+    fn look<S: Simd>(&mut self, simd: S, surface: &Surface, point: Vec3, leaf: u32) {
         let block = &surface.blocks[leaf as usize];
         let local = [0, 1, 2].map(|k| (point[k] - f64::from(block.origin[k])) as f32);
-        let squared = kernel::point_triangles(local, block);
+        let squared = kernel::squared_distances(simd, local, block);
         let own = &surface.leaves[leaf as usize];
         let filled = (1u32 << own.triangles) - 1;
-        let likeliest = kernel::at_most(&squared, kernel::least(&squared)) & filled;
+        let likeliest = kernel::bits(squared.simd_le(squared.reduce_min())) & filled;
         let mut looked = 0;
         for of in [likeliest, filled] {
             let reach = self.within * (1.0 + ERROR) + block.error;
-            let mut mask = kernel::at_most(&squared, reach * reach * ROUNDING) & of & !looked;
+            let mut mask = kernel::bits(squared.simd_le(reach * reach * ROUNDING)) & of & !looked;
             looked |= of;
             while mask != 0 {
                 let triangle = own.first_triangle + mask.trailing_zeros();
@@ -103,6 +105,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::mesh::TriMesh;
+    use fearless_simd::{Level, dispatch};
 
     /// Would catch a triangle that the search passes over: the foot is that of brute force, near and far, inside and outside.
     #[test]
@@ -124,9 +127,11 @@ mod tests {
                 .enumerate()
                 .min_by(|a, b| a.1.total_cmp(&b.1))
                 .unwrap();
-            let (triangle, foot) = nearest.foot(&surface, point, f64::MAX.sqrt(), 1e-5).unwrap();
+            let mut find =
+                |within| dispatch!(Level::new(), simd => nearest.foot(simd, &surface, point, within, 1e-5));
+            let (triangle, foot) = find(f64::MAX.sqrt()).unwrap();
             assert_eq!((triangle as usize, foot.signed_distance.abs()), brute, "{point:?}");
-            assert!(nearest.foot(&surface, point, 1.0001 * brute.1, 1e-5).is_some());
+            assert!(find(1.0001 * brute.1).is_some());
         }
     }
 }

@@ -1,9 +1,9 @@
 //! The inner loops over edges, eight at a time; like those of the kernel, but in single precision throughout: what they
 //! let through is looked at again exactly, and what they refuse is certain.
 
-use super::kernel::{lanes, least};
+use super::kernel::{bits, lanes, lanes_of};
 use crate::surface::{Cone, LANES, Leaf};
-use wide::f32x8;
+use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
 
 /// Bound of the accumulated rounding relative to the magnitudes of the factors: some 20 operations of half a unit in the last
 /// place each, and the rounding of what they start from.
@@ -22,9 +22,9 @@ pub(super) struct SegmentBlock {
 }
 
 impl SegmentBlock {
-    /// Lanes that are near nothing.
+    /// Lanes that are near nothing: so far away that they never are the closest, but not so far that a height is not a number.
     pub(super) const EMPTY: Self = Self {
-        ends: [[[f32::INFINITY; LANES]; 3]; 2],
+        ends: [[[1e30; LANES]; 3]; 2],
         within: [0.0; LANES],
         normal: [[0.0; LANES]; 3],
         cos: [-1.0; LANES],
@@ -50,35 +50,35 @@ impl SegmentBlock {
 
     /// Which edges may touch something with a normal in this cone.
     #[inline(always)]
-    pub(super) fn facing(&self, cone: &Cone) -> u32 {
-        facing([&self.cos, &self.sin], &self.normal, cone, cone.axis.map(f32x8::splat)).to_bitmask()
+    pub(super) fn facing<S: Simd>(&self, simd: S, cone: &Cone) -> u32 {
+        let axis = cone.axis.map(|c| f32x8::splat(simd, c));
+        bits(facing([&self.cos, &self.sin], &self.normal, cone, axis))
     }
 
     /// Two masks: of the edges that may be as close to a leaf as they need to be, and of those that may meet its bounds; and a
     /// lower bound of the distance of any of them.
     #[inline(always)]
-    pub(super) fn near(&self, leaf: &Leaf, slack: f32) -> (u32, u32, f32) {
-        let slack = f32x8::splat(slack);
-        let mut apart = -slack;
-        let mut heights = [f32x8::ZERO; 2];
+    pub(super) fn near<S: Simd>(&self, simd: S, leaf: &Leaf, slack: f32) -> (u32, u32, f32) {
+        let mut apart = f32x8::splat(simd, -slack);
+        let mut heights = [f32x8::splat(simd, 0.0); 2];
         for k in 0..3 {
-            let (a, b) = (lanes(self.ends[0][k]), lanes(self.ends[1][k]));
-            let (low, high) = (a.fast_min(b), a.fast_max(b));
-            let under = f32x8::splat(leaf.min[k]) - high - slack;
-            let over = low - f32x8::splat(leaf.max[k]) - slack;
-            apart = apart.fast_max(under).fast_max(over);
-            let normal = f32x8::splat(leaf.normal[k]);
+            let (a, b) = (lanes(simd, &self.ends[0][k]), lanes(simd, &self.ends[1][k]));
+            let (low, high) = (a.min(b), a.max(b));
+            let under = f32x8::splat(simd, leaf.min[k]) - high - slack;
+            let over = low - leaf.max[k] - slack;
+            apart = apart.max(under).max(over);
+            let normal = f32x8::splat(simd, leaf.normal[k]);
             heights[0] += normal * a;
             heights[1] += normal * b;
         }
-        let (low, high) = (heights[0].fast_min(heights[1]), heights[0].fast_max(heights[1]));
-        let under = f32x8::splat(leaf.low) - high - slack;
-        let over = low - f32x8::splat(leaf.high) - slack;
-        let apart = apart.fast_max(under).fast_max(over);
-        let within = lanes(self.within);
-        let meeting = (apart.simd_le(f32x8::ZERO) & within.simd_gt(f32x8::ZERO)).to_bitmask();
-        let near = apart.simd_lt(within).to_bitmask();
-        (near | meeting, meeting, least(&apart.to_array()))
+        let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
+        let under = f32x8::splat(simd, leaf.low) - high - slack;
+        let over = low - leaf.high - slack;
+        let apart = apart.max(under).max(over);
+        let within = lanes(simd, &self.within);
+        let meeting = bits(apart.simd_le(0.0) & within.simd_gt(0.0));
+        let near = bits(apart.simd_lt(within));
+        (near | meeting, meeting, apart.reduce_min())
     }
 }
 
@@ -137,13 +137,21 @@ impl RidgeBlock {
     /// touch, the common perpendicular meets both between their ends, and it is short enough, or, on the inner side (against
     /// the cone's axis), shorter than `crossing`.
     #[inline(always)]
-    pub(super) fn meeting(&self, p: [f32; 3], d: [f32; 3], cone: &Cone, within: f32, crossing: f32) -> u32 {
-        let splat = |v: [f32; 3]| v.map(f32x8::splat);
+    pub(super) fn meeting<S: Simd>(
+        &self,
+        simd: S,
+        p: [f32; 3],
+        d: [f32; 3],
+        cone: &Cone,
+        within: f32,
+        crossing: f32,
+    ) -> u32 {
+        let splat = |v: [f32; 3]| v.map(|c| f32x8::splat(simd, c));
         let (n, size) = (splat(cone.axis), length(d));
-        let far = f32x8::splat(length(p) + size + self.radius);
-        let (p, d, size) = (splat(p), splat(d), f32x8::splat(size));
-        let (e, lengths) = (self.along.map(lanes), lanes(self.length));
-        let start = self.start.map(lanes);
+        let far = f32x8::splat(simd, length(p) + size + self.radius);
+        let (p, d, size) = (splat(p), splat(d), f32x8::splat(simd, size));
+        let (e, lengths) = (lanes_of(simd, &self.along), lanes(simd, &self.length));
+        let start = lanes_of(simd, &self.start);
         let r = [p[0] - start[0], p[1] - start[1], p[2] - start[2]];
         let w = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
         let whole = dot(w, w);
@@ -152,16 +160,15 @@ impl RidgeBlock {
         let h = dot(r, w);
         let h_error = area * far * ERROR;
         let inward = h * dot(n, w);
-        let (crossing, own) = (f32x8::splat(crossing), lanes(self.within));
-        let limit = f32x8::splat(within).fast_min(own);
+        let (crossing, own) = (f32x8::splat(simd, crossing), lanes(simd, &self.within));
+        let limit = own.min(within);
         let passed = inward.simd_gt(h_error * area * -4.0) & crossing.simd_gt(limit);
-        let limit = passed.bitselect(crossing, limit);
-        let least = (h.abs() - h_error).fast_max(f32x8::ZERO);
+        let limit = passed.select(crossing, limit);
+        let least = (h.abs() - h_error).max(0.0);
         let whole = whole + area * area * ERROR;
         let short = (least * least).simd_le(limit * limit * whole * (1.0 + 1e-5));
-        let mask =
-            (facing([&self.cos, &self.sin], &self.normal, cone, n) & short & limit.simd_gt(f32x8::ZERO))
-                .to_bitmask();
+        let facing = facing([&self.cos, &self.sin], &self.normal, cone, n);
+        let mask = bits(facing & short & limit.simd_gt(0.0));
         if mask == 0 {
             return 0;
         }
@@ -175,20 +182,26 @@ impl RidgeBlock {
             & s.simd_lt(whole + s_error)
             & t.simd_gt(-t_error)
             & t.simd_lt(whole + t_error);
-        between.to_bitmask() & mask
+        bits(between) & mask
     }
 }
 
 /// [`Cone::faces`] for eight cones, given by cosines and sines and axes; `n` is the axis of the single one.
 #[inline(always)]
-fn facing([cos, sin]: [&[f32; LANES]; 2], axes: &[[f32; LANES]; 3], cone: &Cone, n: [f32x8; 3]) -> f32x8 {
-    let aligned = dot(n, axes.map(lanes));
-    let (cos, sin) = (lanes(*cos), lanes(*sin));
-    (cos + cone.cos).simd_le(f32x8::ZERO) | aligned.simd_le(sin * cone.sin - cos * cone.cos + Cone::SLACK)
+fn facing<S: Simd>(
+    [cos, sin]: [&[f32; LANES]; 2],
+    axes: &[[f32; LANES]; 3],
+    cone: &Cone,
+    n: [f32x8<S>; 3],
+) -> mask32x8<S> {
+    let simd = n[0].simd;
+    let aligned = dot(n, lanes_of(simd, axes));
+    let (cos, sin) = (lanes(simd, cos), lanes(simd, sin));
+    (cos + cone.cos).simd_le(0.0) | aligned.simd_le(sin * cone.sin - cos * cone.cos + Cone::SLACK)
 }
 
 #[inline(always)]
-fn dot(a: [f32x8; 3], b: [f32x8; 3]) -> f32x8 {
+fn dot<S: Simd>(a: [f32x8<S>; 3], b: [f32x8<S>; 3]) -> f32x8<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
@@ -199,8 +212,28 @@ fn length(v: [f32; 3]) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::mesh::TriMesh;
+    use crate::surface::Surface;
     use crate::vector::{Vec3, add, dot, norm, scale, sub};
+    use fearless_simd::{Level, dispatch};
+
+    /// Would catch a lane without an edge that hides how close the others are: then edges would not be looked at when they come near.
+    #[test]
+    fn empty_lanes_hide_no_distance() {
+        let mesh = TriMesh::new(vec![[0.0; 3], [1.0, 0.0, -1.0], [0.0, 1.0, 1.0]], vec![[0, 1, 2]]).unwrap();
+        let surface = Surface::build(&mesh);
+        for edges in 1..=LANES {
+            let mut block = SegmentBlock::EMPTY;
+            for lane in 0..edges {
+                let x = 3.0 + (edges - lane) as f32;
+                block.set(lane, [[x, 0.0, 0.0], [x, 1.0, 0.0]], 0.5);
+            }
+            let near = dispatch!(Level::new(), simd => block.near(simd, &surface.leaves[0], 0.0));
+            assert_eq!(near, (0, 0, 3.0), "{edges}");
+        }
+    }
 
     /// Would catch a pair of edges that is refused although their common perpendicular is short enough, meets both and lies in
     /// both cones: nearly parallel ones, and ones that have passed each other, included.
@@ -229,7 +262,7 @@ mod tests {
             let opposite = Cone::wide(to32(scale(outward, -1.0)), 0.999);
             block.set(0, 0, [to32(other), to32(add(other, e))], opposite, within);
             let cone = Cone::wide(to32(outward), 0.999);
-            let hit = block.meeting(to32(start), to32(d), &cone, within, crossing);
+            let hit = dispatch!(Level::new(), simd => block.meeting(simd, to32(start), to32(d), &cone, within, crossing));
             let between = s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
             // From the first edge to the second it is against the normal when they have passed.
             let limit = if dot(sub(q, p), outward) < 0.0 { crossing } else { within };

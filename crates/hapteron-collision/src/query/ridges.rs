@@ -8,6 +8,7 @@ use super::side::{Clear, Side};
 use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{Cone, Edge, EdgeKind, LANES, Leaf, Surface};
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or};
+use fearless_simd::Simd;
 
 /// Slack of the test whether a direction lies in an edge's normal cone (its cosine; the cones are in single precision).
 const CONE_SLACK: f64 = Cone::SLACK as f64;
@@ -63,7 +64,9 @@ impl Ridges {
             if within <= 0.0 {
                 continue;
             }
-            let [a, b] = edge.vertices.map(|v| pair.motion.point(pair.body.vertices[v as usize]));
+            let [a, b] = edge.vertices;
+            let a = pair.motion.point(pair.body.vertices[a as usize]);
+            let b = pair.motion.point(pair.body.vertices[b as usize]);
             let outward = pair.motion.direction(edge.normal.map(f64::from));
             let cone = Cone::wide(outward.map(|c| c as f32), edge.cone);
             let lane = self.own.len() % LANES;
@@ -122,7 +125,8 @@ fn local(p: Vec3, origin: [f32; 3]) -> [f32; 3] {
 /// How close the middle of an edge must come to another edge to show more than its ends do; zero when an end lies inside.
 #[inline(always)]
 fn reach(edge: &Edge, side: &Side, pair: Pair<'_>, least: f64) -> f64 {
-    let [a, b] = edge.vertices.map(|v| side.signed_distance(v));
+    let [a, b] = edge.vertices;
+    let (a, b) = (side.signed_distance(a), side.signed_distance(b));
     let ends = a.min(b);
     if ends <= 0.0 {
         0.0
@@ -135,8 +139,9 @@ fn reach(edge: &Edge, side: &Side, pair: Pair<'_>, least: f64) -> f64 {
 
 /// Finds the places where the middles of two edges are closer to each other than their ends are to anything, and those
 /// where two edges have passed each other.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-pub(super) fn find(
+#[inline(always)]
+pub(super) fn find<S: Simd>(
+    simd: S,
     pair: Pair<'_>,
     neighbours: &Neighbours,
     [body, obstacle]: [&Side; 2],
@@ -168,10 +173,10 @@ pub(super) fn find(
                 continue;
             }
             for eight in 0..ridges.segments.len() {
-                let (mut mask, meeting, apart) = ridges.segments[eight].near(theirs, slack);
+                let (mut mask, meeting, apart) = ridges.segments[eight].near(simd, theirs, slack);
                 lower = if apart < lower { apart } else { lower };
                 mask = if facing && mask != 0 {
-                    mask & ridges.segments[eight].facing(&theirs.ridge_cone)
+                    mask & ridges.segments[eight].facing(simd, &theirs.ridge_cone)
                 } else {
                     0
                 };
@@ -183,7 +188,15 @@ pub(super) fn find(
                     let range = ridges.gather(pair, obstacle, other, least);
                     let ridge = ridges.own[eight * LANES + lane];
                     for block in &ridges.blocks[range.0..range.1] {
-                        meet(pair, &ridge, block, crossing, |edge| reach(edge, obstacle, pair, least), sink);
+                        meet(
+                            simd,
+                            pair,
+                            &ridge,
+                            block,
+                            crossing,
+                            |edge| reach(edge, obstacle, pair, least),
+                            sink,
+                        );
                     }
                 }
             }
@@ -196,7 +209,8 @@ pub(super) fn find(
 }
 
 #[inline(always)]
-fn meet(
+fn meet<S: Simd>(
+    simd: S,
     pair: Pair<'_>,
     ridge: &Ridge,
     block: &RidgeBlock,
@@ -207,7 +221,7 @@ fn meet(
     let start = local(ridge.start, block.origin);
     let along = ridge.along.map(|c| c as f32);
     let (within, crossing32) = ((ridge.within as f32).next_up(), (crossing as f32).next_up());
-    let mut mask = block.meeting(start, along, &ridge.cone, within, crossing32);
+    let mut mask = block.meeting(simd, start, along, &ridge.cone, within, crossing32);
     while mask != 0 {
         let lane = mask.trailing_zeros() as usize;
         mask &= mask - 1;

@@ -8,9 +8,11 @@ use super::side::{Clear, Side};
 use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{ERROR, LANES, Surface, VertexNormal};
 use crate::vector::{Rigid, Vec3, dot, scale};
+use fearless_simd::{Simd, prelude::*};
 
 /// Where the vertices of one surface look for their feet on the other.
-struct Search<'a> {
+struct Search<'a, S> {
+    simd: S,
     own: &'a Surface,
     other: &'a Surface,
     neighbours: &'a Neighbours,
@@ -62,8 +64,9 @@ struct Look {
 }
 
 /// Gives every vertex of the body within the tolerance its signed distance, and makes its contact.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-pub(super) fn of_body(
+#[inline(always)]
+pub(super) fn of_body<S: Simd>(
+    simd: S,
     pair: Pair<'_>,
     neighbours: &Neighbours,
     side: &mut Side,
@@ -71,6 +74,7 @@ pub(super) fn of_body(
     sink: &mut Sink<'_>,
 ) {
     let search = Search {
+        simd,
         own: pair.body,
         other: pair.obstacle,
         neighbours,
@@ -80,12 +84,20 @@ pub(super) fn of_body(
         slack: pair.slack() as f32,
         error: ERROR * pair.tolerance as f32,
     };
-    run(&search, side, scratch, |vertex, point, foot| push_body_vertex(pair, vertex, point, foot, sink));
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            run(&search, side, scratch, |vertex, point, foot| {
+                push_body_vertex(pair, vertex, point, foot, sink)
+            })
+        },
+    );
 }
 
 /// The same for the vertices of the obstacle.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-pub(super) fn of_obstacle(
+#[inline(always)]
+pub(super) fn of_obstacle<S: Simd>(
+    simd: S,
     pair: Pair<'_>,
     neighbours: &Neighbours,
     side: &mut Side,
@@ -93,6 +105,7 @@ pub(super) fn of_obstacle(
     sink: &mut Sink<'_>,
 ) {
     let search = Search {
+        simd,
         own: pair.obstacle,
         other: pair.body,
         neighbours,
@@ -102,14 +115,22 @@ pub(super) fn of_obstacle(
         slack: pair.slack() as f32,
         error: ERROR * pair.tolerance as f32,
     };
-    run(&search, side, scratch, |vertex, _, foot| push_obstacle_vertex(pair, vertex, foot, sink));
+    simd.vectorize(
+        #[inline(always)]
+        || run(&search, side, scratch, |vertex, _, foot| push_obstacle_vertex(pair, vertex, foot, sink)),
+    );
 }
 
 /// Vertices are searched for in batches of about this many, stage by stage: the same inner loop many times over.
 const BATCH: usize = 64;
 
 #[inline(always)]
-fn run(search: &Search<'_>, side: &mut Side, scratch: &mut Scratch, mut push: impl FnMut(u32, Vec3, &Foot)) {
+fn run<S: Simd>(
+    search: &Search<'_, S>,
+    side: &mut Side,
+    scratch: &mut Scratch,
+    mut push: impl FnMut(u32, Vec3, &Foot),
+) {
     scratch.probes.clear();
     for (i, neighbourhood) in search.neighbours.of.iter().enumerate() {
         let clear = side.clear[i].holds(search.travelled, search.tolerance + f64::from(search.slack));
@@ -136,7 +157,12 @@ fn run(search: &Search<'_>, side: &mut Side, scratch: &mut Scratch, mut push: im
 
 /// Makes a probe of every vertex of a leaf that may be within the tolerance of a near leaf. Gives a lower bound of the distances.
 #[inline(always)]
-fn probes_of_leaf(search: &Search<'_>, side: &Side, scratch: &mut Scratch, of: &Neighbourhood) -> f64 {
+fn probes_of_leaf<S: Simd>(
+    search: &Search<'_, S>,
+    side: &Side,
+    scratch: &mut Scratch,
+    of: &Neighbourhood,
+) -> f64 {
     let &Neighbourhood { leaf, begin, end } = of;
     let near = &search.neighbours.near[begin as usize..end as usize];
     scratch.bounds.clear();
@@ -153,13 +179,13 @@ fn probes_of_leaf(search: &Search<'_>, side: &Side, scratch: &mut Scratch, of: &
         let lowers = scratch.lowers.len();
         let mut least = (f32::INFINITY, 0);
         for (group, bounds) in scratch.bounds.iter().enumerate() {
-            let lower = bounds.lower(point32, search.slack);
-            let own = kernel::least(&lower);
+            let lower = bounds.lower(search.simd, point32, search.slack);
+            let own = lower.reduce_min();
             if own < least.0 {
-                let lane = kernel::at_most(&lower, own).trailing_zeros() as usize;
+                let lane = kernel::bits(lower.simd_le(own)).trailing_zeros() as usize;
                 least = (own, group * LANES + lane);
             }
-            scratch.lowers.push(lower);
+            scratch.lowers.push(lower.to_array());
         }
         closest = if least.0 < closest { least.0 } else { closest };
         if !(least.0 < limit) {
@@ -175,7 +201,7 @@ fn probes_of_leaf(search: &Search<'_>, side: &Side, scratch: &mut Scratch, of: &
 }
 
 #[inline(always)]
-fn look_in_guesses(search: &Search<'_>, scratch: &mut Scratch) {
+fn look_in_guesses<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) {
     let Scratch { probes, looks, .. } = scratch;
     looks.clear();
     for (index, probe) in probes.iter_mut().enumerate() {
@@ -185,12 +211,14 @@ fn look_in_guesses(search: &Search<'_>, scratch: &mut Scratch) {
 
 /// Looks in all leaves that are not farther than the closest triangle so far.
 #[inline(always)]
-fn look_elsewhere(search: &Search<'_>, scratch: &mut Scratch) {
+fn look_elsewhere<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) {
     let Scratch { probes, lowers, looks, .. } = scratch;
     for (index, probe) in probes.iter_mut().enumerate() {
         let near = &search.neighbours.near[probe.begin as usize..probe.end as usize];
         for (eight, lower) in near.chunks(LANES).zip(&lowers[probe.lowers as usize..]) {
-            let mut mask = kernel::below(lower, probe.within * probe.within * ROUNDING);
+            let mut mask = kernel::bits(
+                kernel::lanes(search.simd, lower).simd_lt(probe.within * probe.within * ROUNDING),
+            );
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize;
                 mask &= mask - 1;
@@ -207,25 +235,27 @@ const ROUNDING: f32 = 1.0 + 1e-6;
 
 /// Distances of a probe to the triangles of a leaf; lowers the bound of its least distance.
 #[inline(always)]
-fn look(search: &Search<'_>, probe: &mut Probe, index: u32, leaf: u32) -> Look {
+fn look<S: Simd>(search: &Search<'_, S>, probe: &mut Probe, index: u32, leaf: u32) -> Look {
     let block = &search.other.blocks[leaf as usize];
     let local = [0, 1, 2].map(|k| (probe.point[k] - f64::from(block.origin[k])) as f32);
-    let squared = kernel::point_triangles(local, block);
+    let squared = kernel::squared_distances(search.simd, local, block);
     let error = block.error + search.error;
-    let nearest = kernel::least(&squared).sqrt() + error;
+    let nearest = squared.reduce_min().sqrt() + error;
     probe.within = if nearest < probe.within { nearest } else { probe.within };
-    Look { probe: index, leaf, error, squared }
+    Look { probe: index, leaf, error, squared: squared.to_array() }
 }
 
 /// Gives every probe the exact foot on the closest of the triangles that may be the closest (usually one), the first of equals:
 /// so the result does not depend on where it looked first.
 #[inline(always)]
-fn settle(search: &Search<'_>, scratch: &mut Scratch) {
+fn settle<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) {
     for look in &scratch.looks {
         let probe = &mut scratch.probes[look.probe as usize];
         let reach = probe.within + look.error;
         let own = &search.other.leaves[look.leaf as usize];
-        let mut mask = kernel::at_most(&look.squared, reach * reach * ROUNDING) & ((1 << own.triangles) - 1);
+        let mut mask =
+            kernel::bits(kernel::lanes(search.simd, &look.squared).simd_le(reach * reach * ROUNDING))
+                & ((1 << own.triangles) - 1);
         while mask != 0 {
             let triangle = own.first_triangle + mask.trailing_zeros();
             mask &= mask - 1;

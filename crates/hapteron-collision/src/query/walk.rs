@@ -1,9 +1,10 @@
 //! The walk through both trees: which leaves of the two surfaces come close to each other.
 
 use super::Pair;
-use super::kernel::{self, Box32};
+use super::kernel::{self, Box32, Corners};
 use crate::surface::{EMPTY, LANES, LEAF, Leaf, Node, Surface};
 use crate::vector::{Rigid, Vec3, norm};
+use fearless_simd::Simd;
 
 /// A leaf with the leaves of the other surface that come close to it, a range of a list.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +21,29 @@ pub(super) struct Neighbours {
     pub near: Vec<u32>,
 }
 
+/// Pairs of leaves, from both sides.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Pairs {
+    pub body: Neighbours,
+    pub obstacle: Neighbours,
+}
+
+impl Pairs {
+    fn clear(&mut self) {
+        self.body.of.clear();
+        self.body.near.clear();
+    }
+
+    /// Ends the list of a leaf of the body that began at `begin`.
+    #[inline(always)]
+    fn end(&mut self, leaf: u32, begin: usize) {
+        let (begin, end) = (begin as u32, self.body.near.len() as u32);
+        if begin != end {
+            self.body.of.push(Neighbourhood { leaf, begin, end });
+        }
+    }
+}
+
 /// Memory of the walk, and its result.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Walk {
@@ -27,8 +51,17 @@ pub(super) struct Walk {
     candidates: Vec<u32>,
     pending: Vec<u32>,
     counts: Vec<u32>,
-    pub body: Neighbours,
-    pub obstacle: Neighbours,
+    /// Leaves that may be closer than what was asked for.
+    pub near: Pairs,
+    /// Those of them that may meet before the near ones must be looked for again.
+    pub touching: Pairs,
+}
+
+/// How far apart near and touching leaves may be, single precision allowed for.
+#[derive(Clone, Copy)]
+struct Margins {
+    near: f32,
+    touching: f32,
 }
 
 /// A node of the body's tree with a range of `candidates` that it must be compared with.
@@ -39,30 +72,31 @@ struct Frame {
     end: u32,
 }
 
-/// Finds all pairs of leaves that may be closer than `reach`.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
-pub(super) fn walk(pair: Pair<'_>, reach: f64, walk: &mut Walk) {
-    walk.body.of.clear();
-    walk.body.near.clear();
+/// Finds all pairs of leaves that may be closer than the tolerance after the body has travelled a distance of `ahead`.
+#[inline(always)]
+pub(super) fn walk<S: Simd>(simd: S, pair: Pair<'_>, ahead: f64, walk: &mut Walk) {
+    walk.near.clear();
+    walk.touching.clear();
     walk.candidates.clear();
     walk.stack.clear();
     if pair.body.nodes.is_empty() || pair.obstacle.nodes.is_empty() {
         return;
     }
-    let margin = (reach + pair.slack()) as f32;
+    let touching = (ahead + pair.slack()) as f32;
+    let margins = Margins { near: (pair.tolerance + ahead + pair.slack()) as f32, touching };
     walk.candidates.push(0);
     walk.stack.push(Frame { node: 0, begin: 0, end: 1 });
     while let Some(frame) = walk.stack.pop() {
         walk.candidates.truncate(frame.end as usize);
         let node = &pair.body.nodes[frame.node as usize];
-        let boxes = kernel::moved_children(node, pair.motion, margin);
+        let boxes = kernel::moved_children(node, pair.motion, margins.near);
         for lane in 0..LANES {
             let child = node.child[lane];
             if child == EMPTY {
                 continue;
             }
             let begin = walk.candidates.len() as u32;
-            refine(pair.obstacle, walk, frame, &boxes[lane], child & LEAF != 0);
+            refine(simd, pair.obstacle, walk, frame, &boxes[lane], child & LEAF != 0);
             let end = walk.candidates.len() as u32;
             if begin == end {
                 continue;
@@ -70,17 +104,20 @@ pub(super) fn walk(pair: Pair<'_>, reach: f64, walk: &mut Walk) {
             if child & LEAF == 0 {
                 walk.stack.push(Frame { node: child, begin, end });
             } else {
-                meet_leaf(pair, walk, child & !LEAF, begin as usize, margin);
+                meet_leaf(simd, pair, walk, child & !LEAF, begin as usize, margins);
                 walk.candidates.truncate(begin as usize);
             }
         }
     }
-    invert(walk, pair.obstacle.leaves.len());
+    let Walk { counts, near, touching, .. } = walk;
+    for pairs in [near, touching] {
+        invert(counts, pairs, pair.obstacle.leaves.len());
+    }
 }
 
 /// Appends to the candidates those of the frame that overlap `b`, opened down to about its size or, for a leaf, to leaves.
 #[inline(always)]
-fn refine(obstacle: &Surface, walk: &mut Walk, frame: Frame, b: &Box32, to_leaves: bool) {
+fn refine<S: Simd>(simd: S, obstacle: &Surface, walk: &mut Walk, frame: Frame, b: &Box32, to_leaves: bool) {
     let extent = b.extent();
     for i in frame.begin..frame.end {
         let candidate = walk.candidates[i as usize];
@@ -95,7 +132,7 @@ fn refine(obstacle: &Surface, walk: &mut Walk, frame: Frame, b: &Box32, to_leave
         walk.pending.push(candidate);
         while let Some(open) = walk.pending.pop() {
             let node = &obstacle.nodes[open as usize];
-            let mut mask = kernel::overlapping_children(node, b);
+            let mut mask = kernel::overlapping_children(simd, node, b);
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize;
                 mask &= mask - 1;
@@ -117,31 +154,38 @@ fn child_extent(node: &Node, lane: usize) -> f32 {
 
 /// Keeps the candidates that may come within the margin of a leaf of the body.
 #[inline(always)]
-fn meet_leaf(pair: Pair<'_>, walk: &mut Walk, index: u32, begin: usize, margin: f32) {
+fn meet_leaf<S: Simd>(simd: S, pair: Pair<'_>, walk: &mut Walk, index: u32, begin: usize, margins: Margins) {
     let leaf = &pair.body.leaves[index as usize];
-    let grown = kernel::moved_block_box(&pair.body.blocks[index as usize], pair.motion, margin);
+    let corners = Corners::moved(simd, &pair.body.blocks[index as usize], pair.motion);
+    let [grown, touching] = [margins.near, margins.touching].map(|margin| corners.bounds(margin));
     let slab = Slab::of(leaf, pair.motion);
-    let first = walk.body.near.len() as u32;
+    let first = [walk.near.body.near.len(), walk.touching.body.near.len()];
     for i in begin..walk.candidates.len() {
         let candidate = walk.candidates[i] & !LEAF;
         let other = &pair.obstacle.leaves[candidate as usize];
-        if grown.overlaps(&other.min, &other.max)
-            && !slab.misses(&other.min, &other.max, margin)
-            && !Slab::of_own(other).misses(&grown.min, &grown.max, 0.0)
+        if !grown.overlaps(&other.min, &other.max) || slab.misses(&other.min, &other.max, margins.near) {
+            continue;
+        }
+        let apart = Slab::of_own(other).apart(corners.heights(other.normal));
+        if apart > margins.near {
+            continue;
+        }
+        walk.near.body.near.push(candidate);
+        if apart <= margins.touching
+            && touching.overlaps(&other.min, &other.max)
+            && !slab.misses(&other.min, &other.max, margins.touching)
         {
-            walk.body.near.push(candidate);
+            walk.touching.body.near.push(candidate);
         }
     }
-    let end = walk.body.near.len() as u32;
-    if first != end {
-        walk.body.of.push(Neighbourhood { leaf: index, begin: first, end });
-    }
+    walk.near.end(index, first[0]);
+    walk.touching.end(index, first[1]);
 }
 
 /// The same pairs by leaf of the obstacle, in the order of its leaves.
 #[inline(always)]
-fn invert(walk: &mut Walk, leaves: usize) {
-    let Walk { counts, body, obstacle, .. } = walk;
+fn invert(counts: &mut Vec<u32>, pairs: &mut Pairs, leaves: usize) {
+    let Pairs { body, obstacle } = pairs;
     counts.clear();
     counts.resize(leaves + 1, 0);
     for &other in &body.near {
@@ -184,6 +228,12 @@ impl Slab {
         let normal = motion.direction(leaf.normal.map(f64::from));
         let shift = crate::vector::dot(normal, motion.translation) as f32;
         Self { normal: normal.map(|c| c as f32), low: leaf.low + shift, high: leaf.high + shift }
+    }
+
+    /// How far from it things between these heights are; negative when they overlap.
+    #[inline(always)]
+    fn apart(&self, (low, high): (f32, f32)) -> f32 {
+        (low - self.high).max(self.low - high)
     }
 
     /// True when the box is farther than `margin` from the slab.

@@ -166,6 +166,20 @@ mod linux {
         Some(kib * 1024)
     }
 
+    /// What the program has allocated and not given back, as far as the system's allocator tells. Unlike [`resident_bytes`] it
+    /// does not move with pages that the kernel takes and gives.
+    #[must_use]
+    pub fn allocated_bytes() -> Option<u64> {
+        #[cfg(target_env = "gnu")]
+        {
+            // SAFETY: no pointers; the allocator takes its own locks.
+            let info = unsafe { libc::mallinfo2() };
+            Some((info.uordblks + info.hblkhd) as u64)
+        }
+        #[cfg(not(target_env = "gnu"))]
+        None
+    }
+
     /// Keeps the CPUs out of deep sleep as long as it lives.
     pub struct WakeLatency(#[allow(dead_code, reason = "open is what it is")] Option<File>);
 
@@ -207,6 +221,11 @@ mod elsewhere {
 
     #[must_use]
     pub fn resident_bytes() -> Option<u64> {
+        None
+    }
+
+    #[must_use]
+    pub fn allocated_bytes() -> Option<u64> {
         None
     }
 

@@ -62,6 +62,15 @@ struct Shared {
     trouble: OnceLock<String>,
 }
 
+/// The side that hands over. When it is gone, as when no session could begin, the thread writes what it has and ends.
+struct Handing(Arc<Shared>);
+
+impl Drop for Handing {
+    fn drop(&mut self) {
+        self.0.done.store(true, Ordering::Release);
+    }
+}
+
 /// Records a session into a folder.
 pub struct Spool {
     rows: RowMaker,
@@ -69,7 +78,7 @@ pub struct Spool {
     folder: PathBuf,
     to: Producer<Entry>,
     lost: u64,
-    shared: Arc<Shared>,
+    handing: Handing,
     thread: JoinHandle<Written>,
 }
 
@@ -127,7 +136,7 @@ impl Spool {
             folder: folder.to_owned(),
             to,
             lost: 0,
-            shared,
+            handing: Handing(shared),
             thread,
         })
     }
@@ -157,7 +166,7 @@ impl Spool {
     /// Why nothing is recorded any more, if that is so: in words, with the file and the time.
     #[must_use]
     pub fn trouble(&self) -> Option<&str> {
-        self.shared.trouble.get().map(String::as_str)
+        self.handing.0.trouble.get().map(String::as_str)
     }
 
     /// Ends the recording with what had not been drained when the session ended. Waits for the disk.
@@ -170,11 +179,12 @@ impl Spool {
         for pass in passes {
             self.push_patiently(Entry::Pass(*pass));
         }
-        self.shared.done.store(true, Ordering::Release);
+        let shared = Arc::clone(&self.handing.0);
+        drop(self.handing);
         self.thread.thread().unpark();
         // It has no way to panic; if it found one, what it had written is there, but nobody knows how much.
         let written = self.thread.join().unwrap_or_default();
-        let trouble = self.shared.trouble.get().cloned();
+        let trouble = shared.trouble.get().cloned();
         Spooled { scene: self.scene, folder: self.folder, written, lost: self.lost, trouble }
     }
 

@@ -207,3 +207,19 @@ fn a_slow_disk_loses_rows_and_holds_up_nobody() {
     assert!(!spooled.is_complete() && spooled.trouble().is_none());
     assert_eq!(lines(&disk) as u64, 1 + spooled.rows());
 }
+
+/// Would catch a thread that goes on looking for rows when the session could not begin and nobody ends the recording.
+#[test]
+fn a_spool_that_is_dropped_ends_its_thread() {
+    let [rows, log, marks] = ["rows", "log", "marks"].map(|name| output(name, Disk::default()));
+    let spool = Spool::begin(scene(), Path::new(""), Outputs { rows, log, marks }, 16).unwrap();
+    let shared = Arc::downgrade(&spool.handing.0);
+    drop(spool);
+    for _ in 0..1000 {
+        if shared.strong_count() == 0 {
+            return;
+        }
+        thread::sleep(Duration::from_millis(10));
+    }
+    panic!("the thread is still there");
+}
