@@ -9,7 +9,7 @@ use parry3d_f64::query::PointQuery;
 use std::path::Path;
 
 #[path = "../../tests/common/ball.rs"]
-mod shape;
+pub(super) mod shape;
 
 /// Plain pseudo-random numbers in [-1, 1).
 struct Random(u64);

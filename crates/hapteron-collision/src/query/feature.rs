@@ -84,7 +84,18 @@ pub(super) fn closest_on_triangle(
 /// Foot of `p` on one triangle of the surface, with the side taken from the closest feature's normal.
 #[inline(always)]
 pub(crate) fn foot(p: Vec3, triangle: u32, surface: &Surface) -> Foot {
-    let corners = surface.triangles[triangle as usize].map(|v| surface.vertices[v as usize]);
+    foot_between(p, corners(triangle, surface), triangle, surface)
+}
+
+/// The corners of a triangle.
+#[inline(always)]
+pub(crate) fn corners(triangle: u32, surface: &Surface) -> [Vec3; 3] {
+    surface.triangles[triangle as usize].map(|v| surface.vertices[v as usize])
+}
+
+/// [`foot`] for a caller that has the triangle's corners.
+#[inline(always)]
+pub(crate) fn foot_between(p: Vec3, corners: [Vec3; 3], triangle: u32, surface: &Surface) -> Foot {
     let (point, feature) = closest_on_triangle(p, corners, triangle, surface);
     let from = sub(p, point);
     let distance = norm(from);

@@ -10,8 +10,8 @@ use super::side::Search;
 use crate::clod::middle::Middle;
 use crate::clod::nearest::{Nearest, slack};
 use crate::clod::{Hierarchy, Node, PURE_HULL, range};
-use crate::query::feature::Foot;
-use crate::surface::Surface;
+use crate::query::feature::{self, Feature, Foot};
+use crate::surface::{Surface, VertexNormal};
 use crate::vector::{Rigid, Vec3, dot, norm, sub};
 
 /// A change of level takes this many queries.
@@ -19,8 +19,13 @@ pub(super) const BLEND_STEPS: f32 = 20.0;
 /// What is nearer than this many tolerances belongs to the front.
 pub(super) const REACH: f64 = 1.25;
 
-/// Searches note what is this many tolerances farther than they need to.
-const BAND: f64 = 0.5;
+/// Searches note what is this many tolerances farther than they need to: more or less by vertex, so that what many vertices know does not
+/// run out in the same query.
+fn band(vertex: u32) -> f64 {
+    // By the golden ratio neighbours are far apart, and all are spread evenly.
+    let spread = vertex.wrapping_mul(0x9e37_79b9);
+    0.25 + 0.5 * f64::from(spread) / f64::from(u32::MAX)
+}
 
 /// A sample within the tolerance.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +35,8 @@ pub(super) struct Found {
     /// Where the vertex is, in the other surface's frame.
     pub point: Vec3,
     pub foot: Foot,
+    /// Of the vertex, in its own surface's frame.
+    pub normal: VertexNormal,
 }
 
 /// What a walk came past.
@@ -50,6 +57,22 @@ struct Planned {
     weight: f32,
     /// Where the memory of the vertex is.
     place: usize,
+    /// Where the vertex is and its normal, own frame.
+    own: Vec3,
+    normal: VertexNormal,
+}
+
+/// The triangle that the foot of a sample was on, kept beside the sample: what is scattered over the memory takes longer to come than to use.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    triangle: u32,
+    corners: [Vec3; 3],
+    /// Lower bound of the distances of all other triangles, plus what the surfaces had moved by then in all.
+    until: f64,
+}
+
+impl Held {
+    const NOTHING: Self = Self { triangle: 0, corners: [[0.0; 3]; 3], until: f64::NEG_INFINITY };
 }
 
 /// The samples of a front whose levels are settled. They stay the ones to look at until the surfaces have moved as far as the
@@ -59,6 +82,8 @@ struct Plan {
     samples: Vec<Planned>,
     /// By sample a lower bound of its distance when it was last looked at, plus what the surfaces had moved by then in all.
     clear: Vec<f64>,
+    /// By sample.
+    held: Vec<Held>,
     /// What could be within the tolerance when the surfaces have moved this far in all, less the tolerance, is not planned for.
     until: f64,
     /// Which levels it was made for.
@@ -71,6 +96,7 @@ impl Plan {
     fn begin(&mut self, judge: &Judge, search: &Search<'_>) {
         self.samples.clear();
         self.clear.clear();
+        self.held.clear();
         self.level = judge.weight * judge.leniency;
         self.until = search.travelled + REACH * search.tolerance;
     }
@@ -174,6 +200,37 @@ impl Front {
         self.look(middle.vertex, place, search, limit).is_some()
     }
 
+    /// The place of a sample and its foot, when that is within the tolerance; otherwise `clear` tells from when on it could be.
+    #[inline(always)]
+    fn look_again(
+        &mut self,
+        sample: &Planned,
+        held: &mut Held,
+        clear: &mut f64,
+        search: &Search<'_>,
+    ) -> Option<(Vec3, Foot)> {
+        let others = held.until - search.travelled;
+        if others > 0.0 {
+            let p = search.motion.point(sample.own);
+            let foot = feature::foot_between(p, held.corners, held.triangle, search.other);
+            let distance = foot.signed_distance.abs();
+            if distance < others {
+                *clear = distance + search.travelled;
+                return (distance <= search.tolerance).then_some((p, foot));
+            }
+        }
+        let found = self.look(sample.vertex, sample.place, search, search.tolerance);
+        let known = self.memory.at(sample.place);
+        *clear = known.distance + search.travelled;
+        // Beside an edge or a vertex another triangle is as close.
+        let face = found.filter(|(_, foot)| matches!(foot.feature, Feature::Face(_)));
+        *held = face.and_then(|_| known.held()).map_or(Held::NOTHING, |(triangle, until)| {
+            let corners = feature::corners(triangle, search.other);
+            Held { triangle, corners, until }
+        });
+        found
+    }
+
     /// The place of a vertex and its foot, when that is within the limit.
     #[inline(always)]
     fn look(&mut self, vertex: u32, place: usize, search: &Search<'_>, limit: f64) -> Option<(Vec3, Foot)> {
@@ -181,7 +238,7 @@ impl Front {
         let slack = slack(search.other.radius + search.tolerance);
         let known = self.memory.at(place);
         let before = known.searched;
-        let foot = known.look(p, search, limit, BAND * search.tolerance, slack, &mut self.nearest);
+        let foot = known.look(p, search, limit, band(vertex) * search.tolerance, slack, &mut self.nearest);
         self.searches += usize::from(known.searched != before);
         foot.map(|foot| (p, foot))
     }
@@ -209,17 +266,22 @@ pub(super) fn find(
     let mut tally = plan.tally;
     let force_from =
         judge.detail.force_from.unwrap_or(search.tolerance).clamp(f64::MIN_POSITIVE, search.tolerance);
-    for (sample, clear) in plan.samples.iter().zip(&mut plan.clear) {
+    for ((sample, clear), held) in plan.samples.iter().zip(&mut plan.clear).zip(&mut plan.held) {
         if *clear > search.travelled + search.tolerance {
             continue;
         }
-        let Some((point, foot)) = front.look(sample.vertex, sample.place, search, search.tolerance) else {
-            *clear = front.memory.at(sample.place).distance + search.travelled;
+        let Some((point, foot)) = front.look_again(sample, held, clear, search) else {
             continue;
         };
         let pressed = 1.0 - foot.signed_distance / force_from;
         tally.contact += f64::from(sample.weight) * pressed.clamp(0.0, 1.0);
-        front.found.push(Found { vertex: sample.vertex, weight: sample.weight, point, foot });
+        front.found.push(Found {
+            vertex: sample.vertex,
+            weight: sample.weight,
+            point,
+            foot,
+            normal: sample.normal,
+        });
         if front.searches >= front.allowed {
             break;
         }
@@ -269,8 +331,11 @@ fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &J
             let known = front.memory.at(place);
             let lower = known.distance + known.at;
             if lower - search.travelled <= reach {
-                front.plan.samples.push(Planned { vertex: sample.vertex, weight, place });
+                let own = search.own.vertices[sample.vertex as usize];
+                let normal = search.own.vertex_normals[sample.vertex as usize];
+                front.plan.samples.push(Planned { vertex: sample.vertex, weight, place, own, normal });
                 front.plan.clear.push(lower);
+                front.plan.held.push(Held::NOTHING);
             }
         }
     }

@@ -326,10 +326,9 @@ impl LodWorkspace {
 
     fn push_body(&mut self, pair: &Pair<'_>, world: &Rigid) {
         let (a, b) = (pair.body.surface, pair.obstacle.surface);
-        for Found { vertex, weight, point, foot } in &self.fronts[0].found {
+        for Found { vertex, weight, point, foot, normal: own } in &self.fronts[0].found {
             self.least.offer(0, *vertex, foot.signed_distance);
             let normal = scale(foot.normal, -1.0);
-            let own = &a.vertex_normals[*vertex as usize];
             if faces(own, pair.motion.direction(own.normal.map(f64::from)), normal, foot.signed_distance) {
                 let features = [Feature::Vertex(*vertex).number(a), foot.feature.number(b)];
                 push(&mut self.contacts, world, [*point, foot.point], normal, foot, *weight, features);
@@ -339,10 +338,9 @@ impl LodWorkspace {
 
     fn push_obstacle(&mut self, pair: &Pair<'_>, world: &Rigid) {
         let (a, b) = (pair.body.surface, pair.obstacle.surface);
-        for Found { vertex, weight, foot, .. } in &self.fronts[1].found {
+        for Found { vertex, weight, foot, normal: own, .. } in &self.fronts[1].found {
             self.least.offer(1, *vertex, foot.signed_distance);
             let normal = pair.motion.direction(foot.normal);
-            let own = &b.vertex_normals[*vertex as usize];
             if faces(own, own.normal.map(f64::from), scale(normal, -1.0), foot.signed_distance) {
                 let features = [foot.feature.number(a), Feature::Vertex(*vertex).number(b)];
                 let points = [pair.motion.point(foot.point), b.vertices[*vertex as usize]];
@@ -378,3 +376,6 @@ fn push(
         obstacle_feature,
     });
 }
+
+#[cfg(test)]
+mod tests;

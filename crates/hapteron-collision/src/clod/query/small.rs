@@ -13,7 +13,7 @@ use crate::surface::Surface;
 const LARGE: f64 = 96.0;
 const SMALL_AGAIN: f64 = 0.5;
 /// Where surfaces move by this share of the tolerance from query to query a large contact has twice as many vertices, and so on.
-const SLOW: f64 = 0.02;
+const SLOW: f64 = 0.0125;
 /// Deeper than this share of the tolerance a contact is exact, until it is less deep than that one: a front shows nothing that is deeper than
 /// the tolerance, and a hard push must not go through.
 const DEEP: f64 = 0.5;

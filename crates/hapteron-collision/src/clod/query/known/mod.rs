@@ -13,21 +13,31 @@ use crate::vector::Vec3;
 
 /// Leaves that are remembered.
 const KEPT: usize = 6;
+/// Triangles that are remembered.
+const CLOSEST: usize = 3;
+/// They are worth remembering when all others are farther than the closest by this factor.
+const WORTH: f32 = 1.01;
 /// Covers the rounding of squares in single precision.
 const ROUNDING: f32 = 1.0 + 1e-6;
 
 /// What is known of a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Known {
-    /// The closest leaves of the other surface when it was last searched for ...
+    /// The closest leaves of the other surface when it was last searched for, the surfaces having moved `searched` in all.
     leaves: [u32; KEPT],
-    /// ... lower bounds of their distances ...
+    /// Lower bounds of their distances when they were last looked at, plus what the surfaces had moved since the search.
     lower: [f32; KEPT],
-    /// ... and of the distances of all other leaves ...
+    /// Lower bound of the distances of all other leaves at the search.
     rest: f32,
+    /// The closest triangles of these leaves when the leaves were last looked at.
+    triangles: [u32; CLOSEST],
+    /// Lower bounds of their distances, and of those of all other triangles, each plus what the surfaces had moved since the search.
+    apart: [f32; CLOSEST],
+    others: f32,
+    /// The triangle that the last foot was on.
+    triangle: u32,
     /// Whether `distance` is exact and not only a lower bound.
     pub exact: bool,
-    /// ... when the surfaces had moved this far in all.
     pub searched: f64,
     /// Its distance to the other surface, or a lower bound ...
     pub distance: f64,
@@ -76,6 +86,10 @@ impl Known {
         leaves: [NOWHERE; KEPT],
         lower: [f32::INFINITY; KEPT],
         rest: 0.0,
+        triangles: [NOWHERE; CLOSEST],
+        apart: [f32::INFINITY; CLOSEST],
+        others: f32::NEG_INFINITY,
+        triangle: NOWHERE,
         exact: false,
         searched: f64::NEG_INFINITY,
         distance: 0.0,
@@ -95,7 +109,10 @@ impl Known {
         nearest: &mut Nearest,
     ) -> Option<Foot> {
         let moved = search.travelled - self.searched;
-        let mut found = self.settle(p, search.other, moved, limit);
+        let mut found = self.recall(p, search.other, moved);
+        if found.is_none() {
+            found = self.settle(p, search.other, moved, limit);
+        }
         if found.is_none() {
             self.search(p, search.other, limit, band, slack, &mut nearest.stack);
             self.searched = search.travelled;
@@ -105,6 +122,7 @@ impl Known {
         let (foot, distance) = found.unwrap_or_else(|| {
             let found = nearest.search(search.other, p, self.leaves[0], limit, slack);
             let foot = found.then(|| feature::foot(p, nearest.triangle, search.other));
+            self.triangle = NOWHERE;
             (foot, foot.map_or(limit, |f| f.signed_distance.abs()))
         });
         self.at = search.travelled;
@@ -113,10 +131,72 @@ impl Known {
         foot.filter(|_| distance <= limit)
     }
 
+    /// The triangle that the last foot was on, and a lower bound of the distances of all others, plus what the surfaces had moved by then in
+    /// all. None when that is not known.
+    #[inline(always)]
+    pub(super) fn held(&self) -> Option<(u32, f64)> {
+        let others = self.triangles.iter().zip(self.apart).filter(|(t, _)| **t != self.triangle);
+        let apart = others.fold(self.others, |least, (_, apart)| least.min(apart));
+        (self.triangle != NOWHERE).then(|| (self.triangle, f64::from(apart) + self.searched))
+    }
+
+    /// The closest foot and its distance, from the triangles that are remembered. None when they do not tell.
+    #[inline(always)]
+    fn recall(&mut self, p: Vec3, other: &Surface, moved: f64) -> Option<(Option<Foot>, f64)> {
+        if self.others == f32::NEG_INFINITY {
+            return None;
+        }
+        let mut best = None;
+        for k in 0..CLOSEST {
+            let (triangle, bound) = (self.triangles[k], f64::from(self.apart[k]) - moved);
+            if triangle == NOWHERE || best.is_some_and(|b: Best| bound > b.distance()) {
+                continue;
+            }
+            let foot = feature::foot(p, triangle, other);
+            self.apart[k] = ((foot.signed_distance.abs() + moved) as f32).next_down();
+            Best::take(&mut best, triangle, foot);
+        }
+        let best = best.filter(|b| b.distance() < f64::from(self.others) - moved)?;
+        self.triangle = best.triangle;
+        Some((Some(best.foot), best.distance()))
+    }
+
+    /// Remembers the closest of the triangles that were looked at, leaf by leaf.
+    #[inline(always)]
+    fn remember(
+        &mut self,
+        other: &Surface,
+        moved: f64,
+        looked: &[bool; KEPT],
+        squared: &[[f32; LANES]; KEPT],
+    ) {
+        self.triangles = [NOWHERE; CLOSEST];
+        self.apart = [f32::INFINITY; CLOSEST];
+        self.others = self.rest;
+        for k in (0..KEPT).filter(|&k| self.leaves[k] != NOWHERE) {
+            if !looked[k] {
+                self.others = self.others.min(self.lower[k]);
+                continue;
+            }
+            let (leaf, block) =
+                (&other.leaves[self.leaves[k] as usize], &other.blocks[self.leaves[k] as usize]);
+            for lane in 0..usize::from(leaf.triangles) {
+                let far = squared[k][lane].sqrt();
+                let apart = ((f64::from(far - (block.error + ERROR * far)) + moved) as f32).next_down();
+                let dropped = insert((leaf.triangle(lane), apart), &mut self.triangles, &mut self.apart);
+                self.others = self.others.min(dropped);
+            }
+        }
+        // Around a vertex more are equally far than are remembered.
+        if self.others < self.apart[0] * WORTH {
+            self.others = f32::NEG_INFINITY;
+        }
+    }
+
     /// The closest foot and its distance, from the leaves that are remembered; none without a foot where all that is known is
     /// that the distance is at least so much, which is beyond the limit. None when they do not tell.
     #[inline(always)]
-    fn settle(&self, p: Vec3, other: &Surface, moved: f64, limit: f64) -> Option<(Option<Foot>, f64)> {
+    fn settle(&mut self, p: Vec3, other: &Surface, moved: f64, limit: f64) -> Option<(Option<Foot>, f64)> {
         let rest = f64::from(self.rest) - moved;
         if !(rest > 0.0) {
             return None;
@@ -133,6 +213,7 @@ impl Known {
             }
             let (near, wrong) = to_leaf(p, other, self.leaves[k], &mut squared[k]);
             (looked[k], error[k]) = (true, wrong);
+            self.lower[k] = ((f64::from(near - wrong) + moved) as f32).next_down();
             lower = lower.min(f64::from(near - wrong));
             within = if near + wrong < within { near + wrong } else { within };
         }
@@ -142,7 +223,7 @@ impl Known {
         if !(rest > f64::from(within)) {
             return None;
         }
-        let mut best: Option<(u32, Foot)> = None;
+        let mut best = None;
         for k in 0..KEPT {
             let reach = within + error[k];
             let leaf = &other.leaves[if looked[k] { self.leaves[k] as usize } else { 0 }];
@@ -151,18 +232,12 @@ impl Known {
             while mask != 0 {
                 let triangle = leaf.first_triangle + mask.trailing_zeros();
                 mask &= mask - 1;
-                let foot = feature::foot(p, triangle, other);
-                let distance = foot.signed_distance.abs();
-                let closer = best.is_none_or(|(held_triangle, held)| {
-                    let held = held.signed_distance.abs();
-                    distance < held || (distance == held && triangle < held_triangle)
-                });
-                if closer {
-                    best = Some((triangle, foot));
-                }
+                Best::take(&mut best, triangle, feature::foot(p, triangle, other));
             }
         }
-        best.map(|(_, foot)| (Some(foot), foot.signed_distance.abs()))
+        self.remember(other, moved, &looked, &squared);
+        self.triangle = best.map_or(NOWHERE, |b: Best| b.triangle);
+        best.map(|b: Best| (Some(b.foot), b.distance()))
     }
 
     /// Searches the tree for the closest leaves.
@@ -177,6 +252,7 @@ impl Known {
         stack: &mut Vec<(f32, u32)>,
     ) {
         let seeds = self.leaves;
+        self.others = f32::NEG_INFINITY;
         self.leaves = [NOWHERE; KEPT];
         self.lower = [f32::INFINITY; KEPT];
         let mut squared = [0.0; LANES];
@@ -224,15 +300,52 @@ impl Known {
     /// Remembers a leaf in the order of distances; the farthest one too many goes with the others.
     #[inline(always)]
     fn keep(&mut self, leaf: u32, lower: f32) {
-        let (mut leaf, mut lower) = (leaf, lower);
-        for k in 0..KEPT {
-            if lower < self.lower[k] {
-                core::mem::swap(&mut leaf, &mut self.leaves[k]);
-                core::mem::swap(&mut lower, &mut self.lower[k]);
-            }
-        }
-        self.rest = self.rest.min(lower);
+        let dropped = insert((leaf, lower), &mut self.leaves, &mut self.lower);
+        self.rest = self.rest.min(dropped);
     }
+}
+
+/// The closest triangle so far with the foot on it.
+#[derive(Clone, Copy)]
+struct Best {
+    triangle: u32,
+    foot: Foot,
+}
+
+impl Best {
+    #[inline(always)]
+    fn distance(&self) -> f64 {
+        self.foot.signed_distance.abs()
+    }
+
+    /// Of equals the first.
+    #[inline(always)]
+    fn take(best: &mut Option<Self>, triangle: u32, foot: Foot) {
+        let new = Self { triangle, foot };
+        let closer = best.is_none_or(|held| {
+            new.distance() < held.distance()
+                || (new.distance() == held.distance() && triangle < held.triangle)
+        });
+        if closer {
+            *best = Some(new);
+        }
+    }
+}
+
+/// Puts something into its place in an order of distances. Gives the distance of what is one too many.
+#[inline(always)]
+fn insert<const N: usize>(
+    (mut what, mut lower): (u32, f32),
+    kept: &mut [u32; N],
+    lowers: &mut [f32; N],
+) -> f32 {
+    for (held, bound) in kept.iter_mut().zip(lowers) {
+        if lower < *bound {
+            core::mem::swap(&mut what, held);
+            core::mem::swap(&mut lower, bound);
+        }
+    }
+    lower
 }
 
 /// Puts the children of a node on the stack, the nearest on top; the order of the others matters less.
@@ -265,73 +378,4 @@ fn to_leaf(p: Vec3, surface: &Surface, leaf: u32, squared: &mut [f32; LANES]) ->
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::vector::{Rigid, norm, sub};
-
-    /// A wavy sheet of 2 n^2 triangles, a metre wide.
-    fn sheet(n: u32) -> Surface {
-        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
-        let at = |i: u32, j: u32| i * (n + 1) + j;
-        for i in 0..=n {
-            for j in 0..=n {
-                let (x, y) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
-                vertices.push([x, y, 0.05 * (9.0 * x).sin() * (7.0 * y).cos()]);
-                if i > 0 && j > 0 {
-                    triangles.push([at(i - 1, j - 1), at(i, j - 1), at(i, j)]);
-                    triangles.push([at(i - 1, j - 1), at(i, j), at(i - 1, j)]);
-                }
-            }
-        }
-        Surface::of_triangles(&vertices, &triangles)
-    }
-
-    /// Would catch a foot that is not the closest because of what was remembered, along slow and fast motions, with feet on
-    /// faces, edges and vertices (of six triangles), near and out of reach: every triangle is looked at for comparison.
-    #[test]
-    fn feet_are_the_closest_along_motions() {
-        let surface = sheet(24);
-        let still =
-            Rigid { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
-        let (limit, band) = (0.06, 0.03);
-        let (mut near, mut far) = (0, 0);
-        for (round, step) in [0.0002, 0.001, 0.006, 0.05].into_iter().enumerate() {
-            let (mut known, mut nearest) = (Known::UNKNOWN, Nearest::default());
-            let (mut last, mut travelled) = ([0.0; 3], 0.0);
-            for i in 0..400 {
-                let t = step * f64::from(i);
-                // Over a vertex of the sheet at first.
-                let p = [
-                    0.25 + 0.4 * (t * (1.0 + round as f64)).sin(),
-                    0.5 + 0.3 * t.cos() - 0.3,
-                    0.08 * (3.0 * t).cos(),
-                ];
-                travelled += if i > 0 { norm(sub(p, last)) } else { 0.0 };
-                last = p;
-                let search = Search {
-                    own: &surface,
-                    other: &surface,
-                    motion: &still,
-                    last: &still,
-                    tolerance: limit,
-                    travelled,
-                };
-                let found = known.look(p, &search, limit, band, 2e-6, &mut nearest);
-                let feet = (0..surface.triangles.len() as u32).map(|t| feature::foot(p, t, &surface));
-                let least = feet.map(|f| f.signed_distance.abs()).fold(f64::INFINITY, f64::min);
-                match found {
-                    Some(foot) => {
-                        near += 1;
-                        assert!((foot.signed_distance.abs() - least).abs() < 1e-15, "{foot:?} {least}");
-                        assert!((known.distance - least).abs() < 1e-15 && known.exact);
-                    }
-                    None => {
-                        far += 1;
-                        assert!(least > limit && known.distance <= least, "{least} {}", known.distance);
-                    }
-                }
-            }
-        }
-        assert!(near > 400 && far > 100, "{near} {far}");
-    }
-}
+mod tests;
