@@ -36,27 +36,31 @@ pub(super) struct LeafBounds {
 }
 
 impl LeafBounds {
-    /// Those of the given leaves; lanes that they do not fill are infinitely far from everything.
+    /// Lanes that are infinitely far from everything.
+    pub(super) const EMPTY: Self = Self {
+        min: [[f32::INFINITY; LANES]; 3],
+        max: [[f32::NEG_INFINITY; LANES]; 3],
+        normal: [[0.0; LANES]; 3],
+        low: [f32::NEG_INFINITY; LANES],
+        high: [f32::INFINITY; LANES],
+    };
+
+    /// Takes those of the given leaves.
     #[inline(always)]
-    pub(super) fn gather(surface: &Surface, leaves: &[u32]) -> Self {
-        let mut result = Self {
-            min: [[f32::INFINITY; LANES]; 3],
-            max: [[f32::NEG_INFINITY; LANES]; 3],
-            normal: [[0.0; LANES]; 3],
-            low: [f32::NEG_INFINITY; LANES],
-            high: [f32::INFINITY; LANES],
-        };
+    pub(super) fn gather(&mut self, surface: &Surface, leaves: &[u32]) {
+        if leaves.len() < LANES {
+            *self = Self::EMPTY;
+        }
         for (lane, &leaf) in leaves.iter().enumerate().take(LANES) {
             let leaf = &surface.leaves[leaf as usize];
             for axis in 0..3 {
-                result.min[axis][lane] = leaf.min[axis];
-                result.max[axis][lane] = leaf.max[axis];
-                result.normal[axis][lane] = leaf.normal[axis];
+                self.min[axis][lane] = leaf.min[axis];
+                self.max[axis][lane] = leaf.max[axis];
+                self.normal[axis][lane] = leaf.normal[axis];
             }
-            result.low[lane] = leaf.low;
-            result.high[lane] = leaf.high;
+            self.low[lane] = leaf.low;
+            self.high[lane] = leaf.high;
         }
-        result
     }
 
     /// Lower bounds of the squared distances of a point to the leaves.

@@ -61,37 +61,37 @@ pub(super) struct MovedRidges {
 }
 
 impl MovedRidges {
-    /// A block after a rotation; its origin is then at `origin`.
+    pub(super) const EMPTY: Self = Self {
+        segments: SegmentBlock::EMPTY,
+        start: [[0.0; LANES]; 3],
+        along: [[0.0; LANES]; 3],
+        normal: [[0.0; LANES]; 3],
+        cos: [1.0; LANES],
+        sin: [0.0; LANES],
+    };
+
+    /// Takes a block after a rotation; its origin is then at `origin`.
     #[inline(always)]
-    pub(super) fn new<S: Simd>(
+    pub(super) fn set<S: Simd>(
+        &mut self,
         simd: S,
         block: &RidgeBlock,
         rotation: &[[f32; 3]; 3],
         origin: [f32; 3],
-    ) -> Self {
-        let zero = [[0.0; LANES]; 3];
-        let mut result = Self {
-            segments: SegmentBlock { ends: [zero; 2] },
-            start: zero,
-            along: zero,
-            normal: zero,
-            cos: block.cos,
-            sin: [0.0; LANES],
-        };
+    ) {
         let (start, along) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
-        let normal = lanes_of(simd, &block.normal);
+        let (normal, cos) = (lanes_of(simd, &block.normal), lanes(simd, &block.cos));
         for row in 0..3 {
             let turn = splat(simd, rotation[row]);
             let (from, to) = (dot(turn, start), dot(turn, along));
             let first = from + origin[row];
-            result.start[row] = from.to_array();
-            result.along[row] = to.to_array();
-            result.normal[row] = dot(turn, normal).to_array();
-            result.segments.ends[0][row] = first.to_array();
-            result.segments.ends[1][row] = (first + to).to_array();
+            self.start[row] = from.to_array();
+            self.along[row] = to.to_array();
+            self.normal[row] = dot(turn, normal).to_array();
+            self.segments.ends[0][row] = first.to_array();
+            self.segments.ends[1][row] = (first + to).to_array();
         }
-        result.sin = sine(lanes(simd, &block.cos)).to_array();
-        result
+        (self.cos, self.sin) = (cos.to_array(), sine(cos).to_array());
     }
 
     /// Which edges may touch something with a normal in this cone.
@@ -232,7 +232,7 @@ mod tests {
             let outward = scale(u, if round % 3 == 0 { 1.0 } else { -1.0 });
             let mut block = RidgeBlock::EMPTY;
             let opposite = Cone::wide(to32(scale(outward, -1.0)), 0.999);
-            block.set(0, [to32(other), to32(add(other, e))], &opposite);
+            block.set(0, [to32(other), to32(add(other, e))], opposite.axis, opposite.cos);
             let cone = Cone::wide(to32(outward), 0.999);
             let one = OneRidge { start: to32(start), along: to32(d), cone };
             let far = (norm(start) + norm(d) + norm(other) + norm(e)) as f32;

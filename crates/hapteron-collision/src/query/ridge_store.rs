@@ -6,7 +6,6 @@
 use crate::surface::{Cone, LANES, Leaf, Surface};
 
 /// Up to eight edges of a leaf about its origin, as a start and a vector to the end, by axis and lane, with their normal cones.
-/// Lanes that have no edge repeat the last one.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct RidgeBlock {
@@ -17,30 +16,23 @@ pub(super) struct RidgeBlock {
 }
 
 impl RidgeBlock {
+    /// Lanes without an edge are so far away that they never are the closest, but not so far that a height is not a number.
     pub(super) const EMPTY: Self = Self {
-        start: [[0.0; LANES]; 3],
+        start: [[1e30; LANES]; 3],
         along: [[0.0; LANES]; 3],
         normal: [[0.0; LANES]; 3],
         cos: [1.0; LANES],
     };
 
-    /// The edge is given by its ends about the origin.
+    /// The edge is given by its ends about the origin, the axis of its normal cone and the cosine of that.
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, [a, b]: [[f32; 3]; 2], cone: &Cone) {
-        for axis in 0..3 {
-            self.start[axis][lane] = a[axis];
-            self.along[axis][lane] = b[axis] - a[axis];
-            self.normal[axis][lane] = cone.axis[axis];
+    pub(super) fn set(&mut self, lane: usize, [a, b]: [[f32; 3]; 2], axis: [f32; 3], cos: f32) {
+        for k in 0..3 {
+            self.start[k][lane] = a[k];
+            self.along[k][lane] = b[k] - a[k];
+            self.normal[k][lane] = axis[k];
         }
-        self.cos[lane] = cone.cos;
-    }
-
-    /// Copies a lane to another one.
-    fn repeat(&mut self, from: usize, to: usize) {
-        for row in self.start.iter_mut().chain(&mut self.along).chain(&mut self.normal) {
-            row[to] = row[from];
-        }
-        self.cos[to] = self.cos[from];
+        self.cos[lane] = cos;
     }
 
     /// One bit for each lane of block number `index` of a leaf that has an edge of its own.
@@ -66,6 +58,13 @@ impl RidgeStore {
         self.begin.resize(surface.leaves.len(), 0);
     }
 
+    /// Makes room for the blocks of about so many leaves, if there are none yet.
+    pub(super) fn expect(&mut self, leaves: usize) {
+        if self.blocks.is_empty() {
+            self.blocks.reserve(leaves + leaves / 4);
+        }
+    }
+
     /// The blocks of a leaf.
     #[inline(always)]
     pub(super) fn of(&mut self, surface: &Surface, index: u32) -> &[RidgeBlock] {
@@ -81,25 +80,18 @@ impl RidgeStore {
         let begin = self.blocks.len();
         self.begin[index as usize] = begin as u32 + 1;
         let leaf = &surface.leaves[index as usize];
-        let origin = surface.blocks[index as usize].origin;
-        let ridges = usize::from(leaf.ridges);
-        for first in (0..ridges).step_by(LANES) {
-            let mut block = RidgeBlock::EMPTY;
-            let edges = &surface.edges[leaf.first_edge as usize + first..leaf.first_edge as usize + ridges];
-            for (lane, edge) in edges.iter().take(LANES).enumerate() {
-                let mut ends = [[0.0; 3]; 2];
-                for (end, &vertex) in ends.iter_mut().zip(&edge.vertices) {
-                    let p = &surface.vertices[vertex as usize];
-                    for axis in 0..3 {
-                        end[axis] = (p[axis] - f64::from(origin[axis])) as f32;
-                    }
-                }
-                block.set(lane, ends, &Cone::wide(edge.normal, edge.cone));
+        let origin = surface.blocks[index as usize].origin.map(f64::from);
+        let first = leaf.first_edge as usize;
+        for edges in surface.edges[first..first + usize::from(leaf.ridges)].chunks(LANES) {
+            self.blocks.push(RidgeBlock::EMPTY);
+            let Some(block) = self.blocks.last_mut() else { continue };
+            for (lane, edge) in edges.iter().enumerate() {
+                let [a, b] = edge.vertices;
+                let (a, b) = (&surface.vertices[a as usize], &surface.vertices[b as usize]);
+                let a = [(a[0] - origin[0]) as f32, (a[1] - origin[1]) as f32, (a[2] - origin[2]) as f32];
+                let b = [(b[0] - origin[0]) as f32, (b[1] - origin[1]) as f32, (b[2] - origin[2]) as f32];
+                block.set(lane, [a, b], edge.normal, Cone::wide_cos(edge.cone));
             }
-            for lane in edges.len()..LANES {
-                block.repeat(edges.len() - 1, lane);
-            }
-            self.blocks.push(block);
         }
         begin
     }

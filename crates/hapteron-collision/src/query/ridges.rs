@@ -112,6 +112,7 @@ pub(super) fn find<S: Simd>(
     let least = sink.least.min(pair.tolerance);
     let first = sink.contacts.len();
     let Ridges { stores, own, clear } = ridges;
+    stores.iter_mut().for_each(|store| store.expect(neighbours.of.len()));
     for (clear, neighbourhood) in clear.iter_mut().zip(&neighbours.of) {
         let leaf = &pair.body.leaves[neighbourhood.leaf as usize];
         if leaf.ridges == 0 || clear.holds(pair.travelled, pair.tolerance) {
@@ -152,9 +153,13 @@ fn of_leaf<S: Simd>(
     let (radius, origin) = (block.radius(), pair.motion.point(block.origin.map(f64::from)));
     let origin32 = [origin[0] as f32, origin[1] as f32, origin[2] as f32];
     let rotation = pair.rotation32();
-    own.clear();
-    for block in store.of(pair.body, index) {
-        own.push(Own { moved: MovedRidges::new(simd, block, &rotation, origin32), within: None });
+    let blocks = store.of(pair.body, index);
+    if own.len() < blocks.len() {
+        own.resize(blocks.len(), Own { moved: MovedRidges::EMPTY, within: None });
+    }
+    for (own, block) in own.iter_mut().zip(blocks) {
+        own.moved.set(simd, block, &rotation, origin32);
+        own.within = None;
     }
     let axis = pair.motion.direction(leaf.ridge_cone.axis.map(f64::from));
     let cone = Cone { axis: [axis[0] as f32, axis[1] as f32, axis[2] as f32], ..leaf.ridge_cone };
@@ -162,7 +167,7 @@ fn of_leaf<S: Simd>(
     for &other in near {
         let theirs = &pair.obstacle.leaves[other as usize];
         let facing = theirs.ridges > 0 && cone.faces_cone(&theirs.ridge_cone);
-        for (eight, block) in own.iter_mut().enumerate() {
+        for (eight, block) in own.iter_mut().enumerate().take(blocks.len()) {
             let apart = block.moved.segments.apart(simd, theirs, slack);
             lower = lower.min(apart);
             if !facing {

@@ -72,8 +72,14 @@ impl Cone {
     /// The cone around a unit vector with (almost) this cosine, on the safe side.
     #[inline(always)]
     pub(crate) fn wide(axis: [f32; 3], cos: f32) -> Self {
-        let cos = (cos - 1.5 * Self::SLACK).max(-1.0);
+        let cos = Self::wide_cos(cos);
         Self { axis, cos, sin: (1.0 - cos * cos).max(0.0).sqrt() }
+    }
+
+    /// The cosine of such a cone.
+    #[inline(always)]
+    pub(crate) fn wide_cos(cos: f32) -> f32 {
+        (cos - 1.5 * Self::SLACK).max(-1.0)
     }
 
     /// True when some direction of this cone may be opposite to one of the other.
