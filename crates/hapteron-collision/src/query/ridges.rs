@@ -134,7 +134,7 @@ pub(super) fn find<S: Simd>(
     sink.sort_from(first);
 }
 
-/// Hands on all pairs of edges that may touch, one of a leaf of the body and one of the leaves near it, and from which distance on they may have
+/// Hands on all pairs of edges that may touch, one of a leaf of the body and one of the leaves near it, and up to which distance they may have
 /// passed each other. Gives a lower bound of the distance of any edge from any of the leaves.
 #[inline(always)]
 fn of_leaf<S: Simd>(
@@ -152,32 +152,23 @@ fn of_leaf<S: Simd>(
     let block = &pair.body.blocks[index as usize];
     let (radius, origin) = (block.radius(), pair.motion.point(block.origin.map(f64::from)));
     let origin32 = [origin[0] as f32, origin[1] as f32, origin[2] as f32];
-    let rotation = pair.rotation32();
-    let blocks = store.of(pair.body, index);
-    if own.len() < blocks.len() {
-        own.resize(blocks.len(), Own { moved: MovedRidges::EMPTY, within: None });
-    }
-    for (own, block) in own.iter_mut().zip(blocks) {
-        own.moved.set(simd, block, &rotation, origin32);
-        own.within = None;
-    }
+    let own = move_ridges(simd, store.of(pair.body, index), &pair.rotation32(), origin32, own);
     let axis = pair.motion.direction(leaf.ridge_cone.axis.map(f64::from));
     let cone = Cone { axis: [axis[0] as f32, axis[1] as f32, axis[2] as f32], ..leaf.ridge_cone };
     let mut lower = f32x8::splat(simd, f32::INFINITY);
     for &other in near {
         let theirs = &pair.obstacle.leaves[other as usize];
         let facing = theirs.ridges > 0 && cone.faces_cone(&theirs.ridge_cone);
-        for (eight, block) in own.iter_mut().enumerate().take(blocks.len()) {
+        for (eight, block) in own.iter_mut().enumerate() {
             let apart = block.moved.segments.apart(simd, theirs, slack);
             lower = lower.min(apart);
             if !facing {
                 continue;
             }
             let mut mask = kernel::bits(apart.simd_lt(tolerance));
-            if mask == 0 {
-                continue;
+            if mask != 0 {
+                mask &= block.moved.facing(simd, &theirs.ridge_cone) & RidgeBlock::filled(leaf, eight);
             }
-            mask &= block.moved.facing(simd, &theirs.ridge_cone) & RidgeBlock::filled(leaf, eight);
             if mask == 0 {
                 continue;
             }
@@ -196,18 +187,42 @@ fn of_leaf<S: Simd>(
                 let ridge = block.moved.edge(lane, from);
                 let number = leaf.first_edge + (eight * LANES + lane) as u32;
                 for (group, blocks) in other_store.of(pair.obstacle, other).iter().enumerate() {
-                    let mut mask =
-                        meeting(simd, &ridge, blocks, within, far) & RidgeBlock::filled(theirs, group);
-                    while mask != 0 {
-                        let lane = (group * LANES) as u32 + mask.trailing_zeros();
-                        mask &= mask - 1;
-                        hand_on(number, theirs.first_edge + lane, crossing);
-                    }
+                    let mask = meeting(simd, &ridge, blocks, within, far) & RidgeBlock::filled(theirs, group);
+                    let first = theirs.first_edge + (group * LANES) as u32;
+                    set_bits(mask, |lane| hand_on(number, first + lane, crossing));
                 }
             }
         }
     }
     lower.reduce_min()
+}
+
+/// Turns the ridges of a leaf of the body into the obstacle's frame, where the leaf's origin is at `origin`.
+#[inline(always)]
+fn move_ridges<'a, S: Simd>(
+    simd: S,
+    blocks: &[RidgeBlock],
+    rotation: &[[f32; 3]; 3],
+    origin: [f32; 3],
+    own: &'a mut Vec<Own>,
+) -> &'a mut [Own] {
+    if own.len() < blocks.len() {
+        own.resize(blocks.len(), Own { moved: MovedRidges::EMPTY, within: None });
+    }
+    for (own, block) in own.iter_mut().zip(blocks) {
+        own.moved.set(simd, block, rotation, origin);
+        own.within = None;
+    }
+    &mut own[..blocks.len()]
+}
+
+/// Calls a function with the number of each bit that is set, from the lowest.
+#[inline(always)]
+fn set_bits(mut mask: u32, mut call: impl FnMut(u32)) {
+    while mask != 0 {
+        call(mask.trailing_zeros());
+        mask &= mask - 1;
+    }
 }
 
 /// A point in single precision, as seen from another one.
