@@ -1,4 +1,4 @@
-//! The references of the real pairs beside the project, when they are there.
+//! The references of the real pairs beside the project, when they are there; and long motions of these and of the built-in jaws.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -6,7 +6,7 @@ mod common;
 use common::{pose_of, real_pairs};
 use hapteron_collision::mesh::{TriMesh, load};
 use hapteron_collision::{Contact, QueryWorkspace, Surface, query};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -111,4 +111,70 @@ fn distances_and_coverage_are_those_of_the_references() {
             }
         }
     }
+}
+
+/// Asks along pieces of a motion, 30 steps of 1 kHz from a pose to the next one, with one workspace for all, and again with an empty one at
+/// every pose that `cold` chooses. Gives how many contacts were compared.
+fn assert_memory_changes_nothing(
+    name: &str,
+    [body, obstacle]: &[Surface; 2],
+    d: f64,
+    poses: &[Isometry3<f64>],
+    cold: usize,
+) -> usize {
+    let still = Isometry3::identity();
+    let mut workspace = QueryWorkspace::new();
+    let mut compared = 0;
+    for (piece, pair) in poses.windows(2).enumerate().step_by(6) {
+        for step in 0..30 {
+            let pose = pair[0].lerp_slerp(&pair[1], step as f64 / 30.0);
+            let warm = query(body, &pose, obstacle, &still, d, &mut workspace);
+            if step % cold != 0 {
+                continue;
+            }
+            let mut fresh = QueryWorkspace::new();
+            let found = query(body, &pose, obstacle, &still, d, &mut fresh);
+            assert_eq!(
+                found.min_distance.to_bits(),
+                warm.min_distance.to_bits(),
+                "{name}, {step} steps after pose {piece}"
+            );
+            assert_eq!(found.contacts, warm.contacts, "{name}, {step} steps after pose {piece}");
+            compared += found.contacts.len();
+        }
+    }
+    compared
+}
+
+/// Would catch what the memory of a query hides or keeps: along a real hand's motion its result is, bit for bit, that of a query that knows nothing.
+#[test]
+fn memory_changes_nothing_along_real_motions() {
+    let Some(folder) = real_pairs() else { return };
+    // Of the pair with thousands of contacts every fifth pose is compared.
+    for (name, cold) in [("tooth_rows", 1), ("nut_bolt", 5), ("peg_hole", 1), ("spoon_mug", 1)] {
+        let here = folder.join(name);
+        let surfaces =
+            ["body", "obstacle"].map(|file| Surface::build(&load(here.join(format!("{file}.obj"))).unwrap()));
+        let d: f64 = std::fs::read_to_string(here.join("tolerance.txt")).unwrap().trim().parse().unwrap();
+        let table = std::fs::read_to_string(here.join("poses.csv")).unwrap();
+        let poses: Vec<Isometry3<f64>> = table.lines().skip(1).map(pose_of).collect();
+        let compared = assert_memory_changes_nothing(name, &surfaces, d, &poses, cold);
+        assert!(compared > 1000, "{name}: {compared}");
+    }
+}
+
+/// The same on the built-in jaws, closing and grinding.
+#[test]
+fn memory_changes_nothing_while_jaws_grind() {
+    let surfaces =
+        ["upper_jaw", "lower_jaw"].map(|name| Surface::build(&hapteron::assets::builtin(name).unwrap()));
+    let pose = |i: i32| {
+        let phase = 0.1 * f64::from(i);
+        let shift = [4e-4 * phase.sin(), 3e-4 * (1.7 * phase).sin(), 1e-4 + 2e-4 * (0.6 * phase).cos()];
+        let turn = UnitQuaternion::from_euler_angles(0.003 * phase.cos(), 0.0, 0.01 * phase.sin());
+        Isometry3::from_parts(Translation3::from(shift), turn)
+    };
+    let poses: Vec<Isometry3<f64>> = (0..60).map(pose).collect();
+    let compared = assert_memory_changes_nothing("jaws", &surfaces, 5e-4, &poses, 1);
+    assert!(compared > 1000, "{compared}");
 }

@@ -17,7 +17,7 @@ use super::vertices::{push_body_vertex, push_obstacle_vertex};
 use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{LANES, Surface};
 use crate::vector::{Rigid, Vec3, add, dot, norm, scale, sub};
-use fearless_simd::Simd;
+use fearless_simd::{Simd, f32x8, prelude::*};
 use std::ops::Range;
 
 /// Lists to be reused.
@@ -215,8 +215,7 @@ fn long_edges<S>(dive: &Dive<'_, S>, leaf: u32, side: &Side, memory: &mut Memory
         }
         let part = [empty[0] * inverse, 1.0 - empty[1] * inverse];
         if let Some(block) = memory.segments.last_mut() {
-            let ends = part.map(|share| add(start, scale(along, share)).map(|c| c as f32));
-            block.set(lane, ends, f32::MIN_POSITIVE);
+            block.set(lane, ends(start, along, part));
         }
         memory.probes.push(Probe { edge, start, along, part });
     }
@@ -228,15 +227,16 @@ fn long_edges<S>(dive: &Dive<'_, S>, leaf: u32, side: &Side, memory: &mut Memory
 #[inline(always)]
 fn cross_leaves<S: Simd>(dive: &Dive<'_, S>, near: &[u32], memory: &mut Memory) -> f32 {
     memory.crossings.clear();
-    let mut apart = f32::INFINITY;
     if memory.probes.is_empty() {
-        return apart;
+        return f32::INFINITY;
     }
+    let mut apart = f32x8::splat(dive.simd, f32::INFINITY);
     for &index in near {
         let leaf = &dive.other.leaves[index as usize];
         for (eight, block) in memory.segments.iter().enumerate() {
-            let (_, mut mask, closest) = block.near(dive.simd, leaf, dive.slack);
-            apart = if closest < apart { closest } else { apart };
+            let own = block.apart(dive.simd, leaf, dive.slack);
+            apart = apart.min(own);
+            let mut mask = kernel::bits(own.simd_le(0.0));
             while mask != 0 {
                 let probe = &memory.probes[eight * LANES + mask.trailing_zeros() as usize];
                 mask &= mask - 1;
@@ -245,14 +245,26 @@ fn cross_leaves<S: Simd>(dive: &Dive<'_, S>, near: &[u32], memory: &mut Memory) 
         }
     }
     memory.crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    apart
+    apart.reduce_min()
+}
+
+/// The ends of a part of an edge, in single precision.
+#[inline(always)]
+fn ends(start: Vec3, along: Vec3, part: [f64; 2]) -> [[f32; 3]; 2] {
+    let mut result = [[0.0; 3]; 2];
+    for (end, share) in result.iter_mut().zip(part) {
+        for k in 0..3 {
+            end[k] = (start[k] + along[k] * share) as f32;
+        }
+    }
+    result
 }
 
 #[inline(always)]
 fn cross_leaf<S: Simd>(dive: &Dive<'_, S>, probe: &Probe, index: u32, found: &mut Vec<(u32, f64)>) {
     let (leaf, block) = (&dive.other.leaves[index as usize], &dive.other.blocks[index as usize]);
     let from = sub(probe.start, block.origin.map(f64::from));
-    let ends = probe.part.map(|share| add(from, scale(probe.along, share)).map(|c| c as f32));
+    let ends = ends(from, probe.along, probe.part);
     let mut mask = kernel::pierced_triangles(dive.simd, ends, block) & ((1 << leaf.triangles) - 1);
     while mask != 0 {
         let triangle = leaf.first_triangle + mask.trailing_zeros();

@@ -1,7 +1,6 @@
 //! The inner loops, eight lanes at a time; every lane is the same IEEE arithmetic on any machine.
 
 use crate::surface::{ERROR, LANES, Node, Surface, TriangleBlock};
-use crate::vector::Rigid;
 use fearless_simd::{Level, Simd, dispatch, f32x8, mask32x8, prelude::*};
 
 /// Eight numbers to calculate with, by the instructions that `simd` stands for.
@@ -25,30 +24,6 @@ pub(super) fn bits<S: Simd>(mask: mask32x8<S>) -> u32 {
     mask.to_bitmask() as u32
 }
 
-/// An axis-aligned box in single precision, rounded outward.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Box32 {
-    pub min: [f32; 3],
-    pub max: [f32; 3],
-}
-
-impl Box32 {
-    #[inline(always)]
-    pub(super) fn overlaps(&self, min: &[f32; 3], max: &[f32; 3]) -> bool {
-        let mut apart = false;
-        for k in 0..3 {
-            apart |= (self.min[k] > max[k]) | (self.max[k] < min[k]);
-        }
-        !apart
-    }
-
-    /// Length of the diagonal, squared.
-    #[inline(always)]
-    pub(super) fn extent(&self) -> f32 {
-        (0..3).map(|k| (self.max[k] - self.min[k]) * (self.max[k] - self.min[k])).sum()
-    }
-}
-
 /// Boxes and slabs of up to eight leaves, by lane.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
@@ -61,27 +36,31 @@ pub(super) struct LeafBounds {
 }
 
 impl LeafBounds {
-    /// Those of the given leaves; lanes that they do not fill are infinitely far from everything.
+    /// Lanes that are infinitely far from everything.
+    pub(super) const EMPTY: Self = Self {
+        min: [[f32::INFINITY; LANES]; 3],
+        max: [[f32::NEG_INFINITY; LANES]; 3],
+        normal: [[0.0; LANES]; 3],
+        low: [f32::NEG_INFINITY; LANES],
+        high: [f32::INFINITY; LANES],
+    };
+
+    /// Takes those of the given leaves.
     #[inline(always)]
-    pub(super) fn gather(surface: &Surface, leaves: &[u32]) -> Self {
-        let mut result = Self {
-            min: [[f32::INFINITY; LANES]; 3],
-            max: [[f32::NEG_INFINITY; LANES]; 3],
-            normal: [[0.0; LANES]; 3],
-            low: [f32::NEG_INFINITY; LANES],
-            high: [f32::INFINITY; LANES],
-        };
+    pub(super) fn gather(&mut self, surface: &Surface, leaves: &[u32]) {
+        if leaves.len() < LANES {
+            *self = Self::EMPTY;
+        }
         for (lane, &leaf) in leaves.iter().enumerate().take(LANES) {
             let leaf = &surface.leaves[leaf as usize];
             for axis in 0..3 {
-                result.min[axis][lane] = leaf.min[axis];
-                result.max[axis][lane] = leaf.max[axis];
-                result.normal[axis][lane] = leaf.normal[axis];
+                self.min[axis][lane] = leaf.min[axis];
+                self.max[axis][lane] = leaf.max[axis];
+                self.normal[axis][lane] = leaf.normal[axis];
             }
-            result.low[lane] = leaf.low;
-            result.high[lane] = leaf.high;
+            self.low[lane] = leaf.low;
+            self.high[lane] = leaf.high;
         }
-        result
     }
 
     /// Lower bounds of the squared distances of a point to the leaves.
@@ -102,17 +81,6 @@ impl LeafBounds {
     }
 }
 
-/// Bit `i` is set when child `i` of the node overlaps the box.
-#[inline(always)]
-pub(super) fn overlapping_children<S: Simd>(simd: S, node: &Node, b: &Box32) -> u32 {
-    let mut apart = mask32x8::splat(simd, false);
-    for k in 0..3 {
-        apart |= lanes(simd, &node.min[k]).simd_gt(b.max[k]);
-        apart |= lanes(simd, &node.max[k]).simd_lt(b.min[k]);
-    }
-    bits(!apart)
-}
-
 /// Lower bounds of the squared distances of a point to a node's children.
 #[inline(always)]
 pub(super) fn children_squared<S: Simd>(simd: S, node: &Node, p: [f32; 3], slack: f32) -> [f32; LANES] {
@@ -126,91 +94,26 @@ pub(super) fn children_squared<S: Simd>(simd: S, node: &Node, p: [f32; 3], slack
     sum.to_array()
 }
 
-/// The boxes of a node's children after a rigid motion, each grown by `margin` on all sides.
+/// Scalar products with the vectors of a block.
 #[inline(always)]
-pub(super) fn moved_children(node: &Node, motion: &Rigid, margin: f32) -> [Box32; LANES] {
-    let mut result = [Box32 { min: [0.0; 3], max: [0.0; 3] }; LANES];
-    for row in 0..3 {
-        let r = motion.rotation[row].map(|c| c as f32);
-        let t = motion.translation[row] as f32;
-        for (l, moved) in result.iter_mut().enumerate() {
-            let mut center = t;
-            let mut half = margin;
-            for k in 0..3 {
-                center += r[k] * (0.5 * (node.min[k][l] + node.max[k][l]));
-                half += r[k].abs() * (0.5 * (node.max[k][l] - node.min[k][l]));
-            }
-            moved.min[row] = center - half;
-            moved.max[row] = center + half;
-        }
-    }
-    result
+fn parts<S: Simd>(simd: S, axis: &[[f32; LANES]; 3], p: &[f32x8<S>; 3]) -> f32x8<S> {
+    lanes(simd, &axis[0]) * p[0] + lanes(simd, &axis[1]) * p[1] + lanes(simd, &axis[2]) * p[2]
 }
 
-/// The corners of a block's triangles, about a point, after a rigid motion.
-#[derive(Clone, Copy)]
-pub(super) struct Corners<S: Simd> {
-    /// By corner and axis.
-    at: [[f32x8<S>; 3]; 3],
-    about: [f32; 3],
-}
-
-impl<S: Simd> Corners<S> {
-    #[inline(always)]
-    pub(super) fn moved(simd: S, block: &TriangleBlock, motion: &Rigid) -> Self {
-        let about = motion.point(block.origin.map(f64::from)).map(|c| c as f32);
-        let (length, third) = (lanes(simd, &block.length[0]), lanes(simd, &block.length[2]));
-        let (x, y) = (lanes(simd, &block.third[0]) * third, lanes(simd, &block.third[1]) * third);
-        let mut at = [[f32x8::splat(simd, 0.0); 3]; 3];
-        for row in 0..3 {
-            let r = motion.rotation[row].map(|c| c as f32);
-            let turned = |v: &[[f32; LANES]; 3]| {
-                lanes(simd, &v[0]) * r[0] + lanes(simd, &v[1]) * r[1] + lanes(simd, &v[2]) * r[2]
-            };
-            let (first, along, across) = (turned(&block.corner), turned(&block.along), turned(&block.across));
-            at[0][row] = first;
-            at[1][row] = first + along * length;
-            at[2][row] = first + along * x + across * y;
-        }
-        Self { at, about }
-    }
-
-    /// The box around them, grown by `margin`.
-    #[inline(always)]
-    pub(super) fn bounds(&self, margin: f32) -> Box32 {
-        let mut result = Box32 { min: [0.0; 3], max: [0.0; 3] };
-        for k in 0..3 {
-            let (low, high) = self.range([self.at[0][k], self.at[1][k], self.at[2][k]]);
-            result.min[k] = self.about[k] + low - margin;
-            result.max[k] = self.about[k] + high + margin;
-        }
-        result
-    }
-
-    /// Between which heights they lie along a direction.
-    #[inline(always)]
-    pub(super) fn heights(&self, normal: [f32; 3]) -> (f32, f32) {
-        let about: f32 = (0..3).map(|k| self.about[k] * normal[k]).sum();
-        let height = |p: &[f32x8<S>; 3]| p[0] * normal[0] + p[1] * normal[1] + p[2] * normal[2];
-        let (low, high) = self.range([height(&self.at[0]), height(&self.at[1]), height(&self.at[2])]);
-        (about + low, about + high)
-    }
-
-    #[inline(always)]
-    fn range(&self, [a, b, c]: [f32x8<S>; 3]) -> (f32, f32) {
-        (a.min(b).min(c).reduce_min(), a.max(b).max(c).reduce_max())
-    }
+/// The vector from the first corners of a block's triangles to a point (from the block's origin).
+#[inline(always)]
+fn from_corners<S: Simd>(simd: S, p: [f32; 3], b: &TriangleBlock) -> [f32x8<S>; 3] {
+    core::array::from_fn(
+        #[inline(always)]
+        |k| f32x8::splat(simd, p[k]) - lanes(simd, &b.corner[k]),
+    )
 }
 
 /// Squared distances of a point (from the block's origin) to the triangles of a block.
 #[inline(always)]
 pub(super) fn squared_distances<S: Simd>(simd: S, p: [f32; 3], b: &TriangleBlock) -> f32x8<S> {
-    let q = [0, 1, 2].map(|k| f32x8::splat(simd, p[k]) - lanes(simd, &b.corner[k]));
-    let part = |axis: &[[f32; LANES]; 3]| {
-        let axis = lanes_of(simd, axis);
-        axis[0] * q[0] + axis[1] * q[1] + axis[2] * q[2]
-    };
-    let (x, y, z) = (part(&b.along), part(&b.across), part(&b.normal));
+    let q = from_corners(simd, p, b);
+    let (x, y, z) = (parts(simd, &b.along, &q), parts(simd, &b.across, &q), parts(simd, &b.normal, &q));
     let length = lanes_of(simd, &b.length);
     let beyond = x - length[0];
     let (u, v) = (lanes_of(simd, &b.second), lanes_of(simd, &b.third));
@@ -229,19 +132,15 @@ pub(super) fn squared_distances<S: Simd>(simd: S, p: [f32; 3], b: &TriangleBlock
 pub(super) fn pierced_triangles<S: Simd>(simd: S, [p, q]: [[f32; 3]; 2], b: &TriangleBlock) -> u32 {
     let reach: f32 = (0..3).map(|k| p[k].abs() + q[k].abs()).sum();
     let error = f32x8::splat(simd, b.error + ERROR * reach);
-    let corner = lanes_of(simd, &b.corner);
-    let [from, to] = [p, q].map(|p| [0, 1, 2].map(|k| f32x8::splat(simd, p[k]) - corner[k]));
-    let part = |axis: &[[f32; LANES]; 3], p: &[f32x8<S>; 3]| {
-        let axis = lanes_of(simd, axis);
-        axis[0] * p[0] + axis[1] * p[1] + axis[2] * p[2]
-    };
-    let (z, to_z) = (part(&b.normal, &from), part(&b.normal, &to));
+    let (from, to) = (from_corners(simd, p, b), from_corners(simd, q, b));
+    let (z, to_z) = (parts(simd, &b.normal, &from), parts(simd, &b.normal, &to));
     let apart = z.min(to_z).simd_gt(error) | z.max(to_z).simd_lt(-error);
     if apart.all_true() {
         return 0;
     }
-    let (x, y) = (part(&b.along, &from), part(&b.across, &from));
-    let (dx, dy, dz) = (part(&b.along, &to) - x, part(&b.across, &to) - y, to_z - z);
+    let (x, y) = (parts(simd, &b.along, &from), parts(simd, &b.across, &from));
+    let (dx, dy) = (parts(simd, &b.along, &to) - x, parts(simd, &b.across, &to) - y);
+    let dz = to_z - z;
     // Where the segment is almost in the plane the share of it is uncertain, and infinite or not a number in it.
     let share = -z / dz;
     let doubled = error + error;

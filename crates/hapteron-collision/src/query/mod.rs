@@ -7,12 +7,14 @@
 //! closer than the tolerance with one contact at each vertex there, and its least distance is the exact one, at a
 //! fraction of the cost of listing all pairs of close triangles.
 
+mod bounds;
 mod deep;
 pub(crate) mod feature;
 pub(crate) mod kernel;
 mod nearest;
 mod result;
 mod ridge_kernel;
+mod ridge_store;
 mod ridges;
 mod side;
 mod vertices;
@@ -49,6 +51,11 @@ impl Pair<'_> {
     fn slack(&self) -> f64 {
         1e-6 * (self.body.radius + self.obstacle.radius + vector::norm(self.motion.translation))
     }
+
+    /// The rotation of the motion in single precision.
+    fn rotation32(&self) -> [[f32; 3]; 3] {
+        self.motion.rotation.map(|row| row.map(|c| c as f32))
+    }
 }
 
 /// Memory of a query, to be kept for the next one on the same pair of surfaces, which is then faster: it remembers which
@@ -84,6 +91,7 @@ impl QueryWorkspace {
     }
 
     /// Makes sure that the lists of near leaves hold all that can be within the tolerance. Gives what the body has travelled.
+    #[inline(always)]
     fn collect(&mut self, simd: impl Simd, pair: Pair<'_>) -> f64 {
         let surfaces = [pair.body.identity, pair.obstacle.identity];
         let Some(root) = pair.body.nodes.first() else {
@@ -102,6 +110,7 @@ impl QueryWorkspace {
         } else {
             self.body.reset(pair.body);
             self.obstacle.reset(pair.obstacle);
+            self.ridges.reset(pair);
         }
         // Looking far ahead pays for a slow motion only, and not at all for a first query or a jump.
         let ahead = if known.is_some() && step < AHEAD * pair.tolerance {
@@ -135,8 +144,9 @@ impl QueryWorkspace {
         let Self { walk, ridges, deep, body, obstacle, scratch, contacts, .. } = self;
         body.clear();
         obstacle.clear();
-        ridges.forget(pair.obstacle);
         let (near, touching) = (&walk.near, &walk.touching);
+        // There rarely are more, and a first query need not copy what it has found again and again.
+        contacts.reserve(2 * (near.body.of.len() + near.obstacle.of.len()));
         let mut sink = Sink { pair, world_from_obstacle, contacts, least: f64::INFINITY };
         vertices::of_body(simd, pair, &near.body, body, scratch, &mut sink);
         vertices::of_obstacle(simd, pair, &near.obstacle, obstacle, scratch, &mut sink);

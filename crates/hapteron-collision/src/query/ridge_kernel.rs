@@ -2,6 +2,7 @@
 //! let through is looked at again exactly, and what they refuse is certain.
 
 use super::kernel::{bits, lanes, lanes_of};
+use super::ridge_store::RidgeBlock;
 use crate::surface::{Cone, LANES, Leaf};
 use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
 
@@ -9,205 +10,174 @@ use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
 /// place each, and the rounding of what they start from.
 const ERROR: f32 = 3e-6;
 
-/// Up to eight edges of a leaf of the body, in the obstacle's frame.
+/// Up to eight segments.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct SegmentBlock {
-    ends: [[[f32; LANES]; 3]; 2],
-    within: [f32; LANES],
-    /// Normal cones.
-    normal: [[f32; LANES]; 3],
-    cos: [f32; LANES],
-    sin: [f32; LANES],
+    pub ends: [[[f32; LANES]; 3]; 2],
 }
 
 impl SegmentBlock {
     /// Lanes that are near nothing: so far away that they never are the closest, but not so far that a height is not a number.
-    pub(super) const EMPTY: Self = Self {
-        ends: [[[1e30; LANES]; 3]; 2],
-        within: [0.0; LANES],
-        normal: [[0.0; LANES]; 3],
-        cos: [-1.0; LANES],
-        sin: [0.0; LANES],
-    };
+    pub(super) const EMPTY: Self = Self { ends: [[[1e30; LANES]; 3]; 2] };
 
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, ends: [[f32; 3]; 2], within: f32) {
+    pub(super) fn set(&mut self, lane: usize, ends: [[f32; 3]; 2]) {
         for axis in 0..3 {
             self.ends[0][axis][lane] = ends[0][axis];
             self.ends[1][axis][lane] = ends[1][axis];
         }
-        self.within[lane] = within;
     }
 
+    /// Lower bounds of the distances to a leaf; not positive where they may meet its bounds.
     #[inline(always)]
-    pub(super) fn set_cone(&mut self, lane: usize, cone: &Cone) {
-        for axis in 0..3 {
-            self.normal[axis][lane] = cone.axis[axis];
-        }
-        (self.cos[lane], self.sin[lane]) = (cone.cos, cone.sin);
-    }
-
-    /// Which edges may touch something with a normal in this cone.
-    #[inline(always)]
-    pub(super) fn facing<S: Simd>(&self, simd: S, cone: &Cone) -> u32 {
-        let axis = cone.axis.map(|c| f32x8::splat(simd, c));
-        bits(facing([&self.cos, &self.sin], &self.normal, cone, axis))
-    }
-
-    /// Two masks: of the edges that may be as close to a leaf as they need to be, and of those that may meet its bounds; and a
-    /// lower bound of the distance of any of them.
-    #[inline(always)]
-    pub(super) fn near<S: Simd>(&self, simd: S, leaf: &Leaf, slack: f32) -> (u32, u32, f32) {
-        let mut apart = f32x8::splat(simd, -slack);
+    pub(super) fn apart<S: Simd>(&self, simd: S, leaf: &Leaf, slack: f32) -> f32x8<S> {
+        let mut apart = f32x8::splat(simd, f32::NEG_INFINITY);
         let mut heights = [f32x8::splat(simd, 0.0); 2];
         for k in 0..3 {
             let (a, b) = (lanes(simd, &self.ends[0][k]), lanes(simd, &self.ends[1][k]));
-            let (low, high) = (a.min(b), a.max(b));
-            let under = f32x8::splat(simd, leaf.min[k]) - high - slack;
-            let over = low - leaf.max[k] - slack;
-            apart = apart.max(under).max(over);
+            apart = apart.max(f32x8::splat(simd, leaf.min[k]) - a.max(b)).max(a.min(b) - leaf.max[k]);
             let normal = f32x8::splat(simd, leaf.normal[k]);
             heights[0] += normal * a;
             heights[1] += normal * b;
         }
         let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
-        let under = f32x8::splat(simd, leaf.low) - high - slack;
-        let over = low - leaf.high - slack;
-        let apart = apart.max(under).max(over);
-        let within = lanes(simd, &self.within);
-        let meeting = bits(apart.simd_le(0.0) & within.simd_gt(0.0));
-        let near = bits(apart.simd_lt(within));
-        (near | meeting, meeting, apart.reduce_min())
+        apart.max(f32x8::splat(simd, leaf.low) - high).max(low - leaf.high) - slack
     }
 }
 
-/// Eight edges of a leaf of the obstacle about an origin nearby, as a start and a vector to the end, by axis and lane, with
-/// their normal cones and the distance within which each is of interest.
+/// Up to eight edges of a leaf of the body in the obstacle's frame: about the leaf's origin, as a start and a vector to the end, with
+/// their normal cones.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-pub(super) struct RidgeBlock {
+pub(super) struct MovedRidges {
+    /// Where they are in the obstacle's frame.
+    pub segments: SegmentBlock,
     start: [[f32; LANES]; 3],
     along: [[f32; LANES]; 3],
-    length: [f32; LANES],
     normal: [[f32; LANES]; 3],
     cos: [f32; LANES],
     sin: [f32; LANES],
-    within: [f32; LANES],
-    pub edge: [u32; LANES],
-    pub origin: [f32; 3],
-    /// Greatest distance of a point on the edges from the origin.
-    radius: f32,
 }
 
-impl RidgeBlock {
-    /// Lanes that meet nothing.
-    pub(super) const fn empty(origin: [f32; 3]) -> Self {
-        Self {
-            start: [[0.0; LANES]; 3],
-            along: [[0.0; LANES]; 3],
-            length: [0.0; LANES],
-            normal: [[0.0; LANES]; 3],
-            cos: [1.0; LANES],
-            sin: [0.0; LANES],
-            within: [0.0; LANES],
-            edge: [u32::MAX; LANES],
-            origin,
-            radius: 0.0,
-        }
-    }
+impl MovedRidges {
+    pub(super) const EMPTY: Self = Self {
+        segments: SegmentBlock::EMPTY,
+        start: [[0.0; LANES]; 3],
+        along: [[0.0; LANES]; 3],
+        normal: [[0.0; LANES]; 3],
+        cos: [1.0; LANES],
+        sin: [0.0; LANES],
+    };
 
+    /// Takes a block after a rotation; its origin is then at `origin`.
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, edge: u32, ends: [[f32; 3]; 2], cone: Cone, within: f32) {
-        let [a, b] = ends;
-        let along = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        for axis in 0..3 {
-            self.start[axis][lane] = a[axis];
-            self.along[axis][lane] = along[axis];
-            self.normal[axis][lane] = cone.axis[axis];
-        }
-        (self.cos[lane], self.sin[lane]) = (cone.cos, cone.sin);
-        self.length[lane] = length(along);
-        self.within[lane] = within;
-        self.edge[lane] = edge;
-        self.radius = self.radius.max(length(a) + self.length[lane]);
-    }
-
-    /// Bit `i` is set when edge `i` may touch the edge from `p` (about the origin) along `d`: surfaces with these normal cones can
-    /// touch, the common perpendicular meets both between their ends, and it is short enough, or, on the inner side (against
-    /// the cone's axis), shorter than `crossing`.
-    #[inline(always)]
-    pub(super) fn meeting<S: Simd>(
-        &self,
+    pub(super) fn set<S: Simd>(
+        &mut self,
         simd: S,
-        p: [f32; 3],
-        d: [f32; 3],
-        cone: &Cone,
-        within: f32,
-        crossing: f32,
-    ) -> u32 {
-        let splat = |v: [f32; 3]| v.map(|c| f32x8::splat(simd, c));
-        let (n, size) = (splat(cone.axis), length(d));
-        let far = f32x8::splat(simd, length(p) + size + self.radius);
-        let (p, d, size) = (splat(p), splat(d), f32x8::splat(simd, size));
-        let (e, lengths) = (lanes_of(simd, &self.along), lanes(simd, &self.length));
-        let start = lanes_of(simd, &self.start);
-        let r = [p[0] - start[0], p[1] - start[1], p[2] - start[2]];
-        let w = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
-        let whole = dot(w, w);
-        let area = size * lengths;
-        // Distance times the root of `whole`, and what is positive on the inner side.
-        let h = dot(r, w);
-        let h_error = area * far * ERROR;
-        let inward = h * dot(n, w);
-        let (crossing, own) = (f32x8::splat(simd, crossing), lanes(simd, &self.within));
-        let limit = own.min(within);
-        let passed = inward.simd_gt(h_error * area * -4.0) & crossing.simd_gt(limit);
-        let limit = passed.select(crossing, limit);
-        let least = (h.abs() - h_error).max(0.0);
-        let whole = whole + area * area * ERROR;
-        let short = (least * least).simd_le(limit * limit * whole * (1.0 + 1e-5));
-        let facing = facing([&self.cos, &self.sin], &self.normal, cone, n);
-        let mask = bits(facing & short & limit.simd_gt(0.0));
-        if mask == 0 {
-            return 0;
+        block: &RidgeBlock,
+        rotation: &[[f32; 3]; 3],
+        origin: [f32; 3],
+    ) {
+        let (start, along) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
+        let (normal, cos) = (lanes_of(simd, &block.normal), lanes(simd, &block.cos));
+        for row in 0..3 {
+            let turn = splat(simd, rotation[row]);
+            let (from, to) = (dot(turn, start), dot(turn, along));
+            let first = from + origin[row];
+            self.start[row] = from.to_array();
+            self.along[row] = to.to_array();
+            self.normal[row] = dot(turn, normal).to_array();
+            self.segments.ends[0][row] = first.to_array();
+            self.segments.ends[1][row] = (first + to).to_array();
         }
-        let ee = lengths * lengths;
-        let (b, c, f) = (dot(d, e), dot(d, r), dot(e, r));
-        // Where along each edge, times `whole`.
-        let (s, t) = (b * f - c * ee, dot(d, d) * f - b * c);
-        let area = size * lengths * far * ERROR;
-        let (s_error, t_error) = (area * lengths, area * size);
-        let between = s.simd_gt(-s_error)
-            & s.simd_lt(whole + s_error)
-            & t.simd_gt(-t_error)
-            & t.simd_lt(whole + t_error);
-        bits(between) & mask
+        (self.cos, self.sin) = (cos.to_array(), sine(cos).to_array());
+    }
+
+    /// Which edges may touch something with a normal in this cone.
+    #[inline(always)]
+    pub(super) fn facing<S: Simd>(&self, simd: S, cone: &Cone) -> u32 {
+        let (cos, sin) = (lanes(simd, &self.cos), lanes(simd, &self.sin));
+        bits(facing(cos, sin, lanes_of(simd, &self.normal), cone))
+    }
+
+    /// The edge of a lane, about an origin that is at `from` as seen from the one of this block.
+    #[inline(always)]
+    pub(super) fn edge(&self, lane: usize, from: [f32; 3]) -> OneRidge {
+        let start = [self.start[0][lane], self.start[1][lane], self.start[2][lane]];
+        let axis = [self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]];
+        OneRidge {
+            start: [start[0] - from[0], start[1] - from[1], start[2] - from[2]],
+            along: [self.along[0][lane], self.along[1][lane], self.along[2][lane]],
+            cone: Cone { axis, cos: self.cos[lane], sin: self.sin[lane] },
+        }
     }
 }
 
-/// [`Cone::faces`] for eight cones, given by cosines and sines and axes; `n` is the axis of the single one.
+/// An edge of the body about the origin of a leaf of the obstacle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OneRidge {
+    pub start: [f32; 3],
+    pub along: [f32; 3],
+    pub cone: Cone,
+}
+
+/// Bit `i` is set when edge `i` of the block may touch the single one: surfaces with these normal cones can touch, the common perpendicular
+/// meets both between their ends, and it is short enough. `far` is no less than any coordinate of either.
 #[inline(always)]
-fn facing<S: Simd>(
-    [cos, sin]: [&[f32; LANES]; 2],
-    axes: &[[f32; LANES]; 3],
-    cone: &Cone,
-    n: [f32x8<S>; 3],
-) -> mask32x8<S> {
-    let simd = n[0].simd;
-    let aligned = dot(n, lanes_of(simd, axes));
-    let (cos, sin) = (lanes(simd, cos), lanes(simd, sin));
+pub(super) fn meeting<S: Simd>(simd: S, one: &OneRidge, block: &RidgeBlock, within: f32, far: f32) -> u32 {
+    let cos = lanes(simd, &block.cos);
+    let mask = bits(facing(cos, sine(cos), lanes_of(simd, &block.normal), &one.cone));
+    if mask == 0 {
+        return 0;
+    }
+    let (p, d) = (splat(simd, one.start), splat(simd, one.along));
+    let (start, e) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
+    let r = [p[0] - start[0], p[1] - start[1], p[2] - start[2]];
+    let w = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
+    let (dd, ee) = (dot(d, d), dot(e, e));
+    let (size, lengths) = (dd.sqrt(), ee.sqrt());
+    let (whole, area) = (dot(w, w), size * lengths);
+    // Distance times the root of `whole`.
+    let distance = (dot(r, w).abs() - area * (far * ERROR)).max(0.0);
+    let bound = whole + area * area * ERROR;
+    let mask = bits((distance * distance).simd_le(bound * (within * within * (1.0 + 1e-5)))) & mask;
+    if mask == 0 {
+        return 0;
+    }
+    let (b, c, f) = (dot(d, e), dot(d, r), dot(e, r));
+    // Where along each edge, times `whole`.
+    let (s, t) = (b * f - c * ee, dd * f - b * c);
+    let area = area * (far * ERROR);
+    let (s_error, t_error) = (area * lengths, area * size);
+    let between =
+        s.simd_gt(-s_error) & s.simd_lt(whole + s_error) & t.simd_gt(-t_error) & t.simd_lt(whole + t_error);
+    bits(between) & mask
+}
+
+#[inline(always)]
+fn sine<S: Simd>(cos: f32x8<S>) -> f32x8<S> {
+    (-(cos * cos) + 1.0).max(0.0).sqrt()
+}
+
+/// [`Cone::faces`] for eight cones.
+#[inline(always)]
+fn facing<S: Simd>(cos: f32x8<S>, sin: f32x8<S>, axes: [f32x8<S>; 3], cone: &Cone) -> mask32x8<S> {
+    let aligned = dot(splat(cos.simd, cone.axis), axes);
     (cos + cone.cos).simd_le(0.0) | aligned.simd_le(sin * cone.sin - cos * cone.cos + Cone::SLACK)
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, v: [f32; 3]) -> [f32x8<S>; 3] {
+    core::array::from_fn(
+        #[inline(always)]
+        |k| f32x8::splat(simd, v[k]),
+    )
 }
 
 #[inline(always)]
 fn dot<S: Simd>(a: [f32x8<S>; 3], b: [f32x8<S>; 3]) -> f32x8<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-fn length(v: [f32; 3]) -> f32 {
-    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
 }
 
 #[cfg(test)]
@@ -216,7 +186,7 @@ mod tests {
     use super::*;
     use crate::mesh::TriMesh;
     use crate::surface::Surface;
-    use crate::vector::{Vec3, add, dot, norm, scale, sub};
+    use crate::vector::{Vec3, add, norm, scale, sub};
     use fearless_simd::{Level, dispatch};
 
     /// Would catch a lane without an edge that hides how close the others are: then edges would not be looked at when they come near.
@@ -228,10 +198,12 @@ mod tests {
             let mut block = SegmentBlock::EMPTY;
             for lane in 0..edges {
                 let x = 3.0 + (edges - lane) as f32;
-                block.set(lane, [[x, 0.0, 0.0], [x, 1.0, 0.0]], 0.5);
+                block.set(lane, [[x, 0.0, 0.0], [x, 1.0, 0.0]]);
             }
-            let near = dispatch!(Level::new(), simd => block.near(simd, &surface.leaves[0], 0.0));
-            assert_eq!(near, (0, 0, 3.0), "{edges}");
+            let least = dispatch!(Level::new(), simd => {
+                block.apart(simd, &surface.leaves[0], 0.0).reduce_min()
+            });
+            assert_eq!(least, 3.0, "{edges}");
         }
     }
 
@@ -256,17 +228,17 @@ mod tests {
             let p = add(q, scale(u, gap));
             let (start, other) = (sub(p, scale(d, s)), sub(q, scale(e, t)));
             let to32 = |v: Vec3| v.map(|c| c as f32);
-            let (within, crossing) = (0.01, if round % 2 == 0 { 0.015 } else { 0.0 });
+            let within = 0.01;
             let outward = scale(u, if round % 3 == 0 { 1.0 } else { -1.0 });
-            let mut block = RidgeBlock::empty([0.0; 3]);
+            let mut block = RidgeBlock::EMPTY;
             let opposite = Cone::wide(to32(scale(outward, -1.0)), 0.999);
-            block.set(0, 0, [to32(other), to32(add(other, e))], opposite, within);
+            block.set(0, [to32(other), to32(add(other, e))], opposite.axis, opposite.cos);
             let cone = Cone::wide(to32(outward), 0.999);
-            let hit = dispatch!(Level::new(), simd => block.meeting(simd, to32(start), to32(d), &cone, within, crossing));
+            let one = OneRidge { start: to32(start), along: to32(d), cone };
+            let far = (norm(start) + norm(d) + norm(other) + norm(e)) as f32;
+            let hit = dispatch!(Level::new(), simd => meeting(simd, &one, &block, within, far)) & 1;
             let between = s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
-            // From the first edge to the second it is against the normal when they have passed.
-            let limit = if dot(sub(q, p), outward) < 0.0 { crossing } else { within };
-            if between && gap.abs() < f64::from(limit) && norm(u) > 0.5 {
+            if between && gap.abs() < f64::from(within) && norm(u) > 0.5 {
                 touching += 1;
                 assert_eq!(hit, 1, "{round}: {s} {t} {gap}");
             } else if hit == 0 {

@@ -2,13 +2,15 @@
 
 use super::Pair;
 use super::feature::Feature;
+use super::kernel;
 use super::result::{Found, Sink};
-use super::ridge_kernel::{RidgeBlock, SegmentBlock};
+use super::ridge_kernel::{MovedRidges, meeting};
+use super::ridge_store::{RidgeBlock, RidgeStore};
 use super::side::{Clear, Side};
-use super::walk::{Neighbourhood, Neighbours};
+use super::walk::Neighbours;
 use crate::surface::{Cone, Edge, EdgeKind, LANES, Leaf, Surface};
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or};
-use fearless_simd::Simd;
+use fearless_simd::{Simd, f32x8, prelude::*};
 
 /// Slack of the test whether a direction lies in an edge's normal cone (its cosine; the cones are in single precision).
 const CONE_SLACK: f64 = Cone::SLACK as f64;
@@ -20,16 +22,46 @@ const TOUCHING: f64 = 1e-12;
 /// Memory of the search.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ridges {
-    /// Edges of the obstacle's leaves, gathered when a query first needs them.
-    blocks: Vec<RidgeBlock>,
-    /// By leaf of the obstacle: where its blocks begin, plus one (zero: not gathered), and end.
-    range: Vec<[u32; 2]>,
-    gathered: Vec<u32>,
-    /// The edges of a leaf of the body, and eight at a time.
-    own: Vec<Ridge>,
-    segments: Vec<SegmentBlock>,
+    stores: [RidgeStore; 2],
+    own: Vec<Own>,
     /// By neighbourhood of the body in the last walk.
     pub clear: Vec<Clear>,
+}
+
+/// Edges of a leaf of the body.
+#[derive(Clone, Debug)]
+struct Own {
+    moved: MovedRidges,
+    /// How close each must come to show more than its ends do, when that has been asked for.
+    within: Option<[f32; LANES]>,
+}
+
+impl Ridges {
+    /// Forgets everything and makes room for two surfaces.
+    pub(super) fn reset(&mut self, pair: Pair<'_>) {
+        self.stores[0].reset(pair.body);
+        self.stores[1].reset(pair.obstacle);
+    }
+}
+
+impl Own {
+    #[inline(always)]
+    fn within(&mut self, leaf: &Leaf, eight: usize, reach: impl Fn(u32) -> f64) -> [f32; LANES] {
+        if let Some(within) = self.within {
+            return within;
+        }
+        // No distance is less than that.
+        let mut within = [f32::NEG_INFINITY; LANES];
+        let first = leaf.first_edge + (eight * LANES) as u32;
+        for (edge, within) in (first..leaf.first_edge + u32::from(leaf.ridges)).zip(&mut within) {
+            let reach = reach(edge);
+            if reach > 0.0 {
+                *within = (reach as f32).next_up();
+            }
+        }
+        self.within = Some(within);
+        within
+    }
 }
 
 /// An edge of the body in the obstacle's frame.
@@ -38,94 +70,22 @@ struct Ridge {
     start: Vec3,
     along: Vec3,
     outward: Vec3,
-    within: f64,
-    cone: Cone,
     index: u32,
 }
 
-impl Ridges {
-    pub(super) fn forget(&mut self, obstacle: &Surface) {
-        for &leaf in &self.gathered {
-            self.range[leaf as usize] = [0; 2];
-        }
-        self.gathered.clear();
-        self.blocks.clear();
-        self.range.resize(obstacle.leaves.len(), [0; 2]);
+impl Ridge {
+    fn new(pair: Pair<'_>, index: u32) -> Self {
+        let edge = &pair.body.edges[index as usize];
+        let [a, b] = edge.vertices.map(|v| pair.motion.point(pair.body.vertices[v as usize]));
+        let outward = pair.motion.direction(edge.normal.map(f64::from));
+        Self { start: a, along: sub(b, a), outward, index }
     }
-
-    /// The edges of a leaf of the body that may show more than their ends do.
-    #[inline(always)]
-    fn gather_own(&mut self, pair: Pair<'_>, side: &Side, leaf: &Leaf, least: f64) {
-        self.own.clear();
-        self.segments.clear();
-        for index in leaf.first_edge..leaf.first_edge + u32::from(leaf.ridges) {
-            let edge = &pair.body.edges[index as usize];
-            let within = reach(edge, side, pair, least);
-            if within <= 0.0 {
-                continue;
-            }
-            let [a, b] = edge.vertices;
-            let a = pair.motion.point(pair.body.vertices[a as usize]);
-            let b = pair.motion.point(pair.body.vertices[b as usize]);
-            let outward = pair.motion.direction(edge.normal.map(f64::from));
-            let cone = Cone::wide(outward.map(|c| c as f32), edge.cone);
-            let lane = self.own.len() % LANES;
-            if lane == 0 {
-                self.segments.push(SegmentBlock::EMPTY);
-            }
-            if let Some(block) = self.segments.last_mut() {
-                block.set(lane, [a, b].map(|p| p.map(|c| c as f32)), (within as f32).next_up());
-                block.set_cone(lane, &cone);
-            }
-            self.own.push(Ridge { start: a, along: sub(b, a), outward, within, cone, index });
-        }
-    }
-
-    /// The blocks of the edges of a leaf of the obstacle that may show more than their ends do.
-    #[inline(always)]
-    fn gather(&mut self, pair: Pair<'_>, side: &Side, leaf: u32, least: f64) -> (usize, usize) {
-        let [begin, end] = self.range[leaf as usize];
-        if begin > 0 {
-            return (begin as usize - 1, end as usize);
-        }
-        let surface = pair.obstacle;
-        let begin = self.blocks.len();
-        let own = &surface.leaves[leaf as usize];
-        let origin = surface.blocks[leaf as usize].origin;
-        let mut lane = LANES;
-        for index in own.first_edge..own.first_edge + u32::from(own.ridges) {
-            let edge = &surface.edges[index as usize];
-            let within = reach(edge, side, pair, least);
-            if within <= 0.0 {
-                continue;
-            }
-            if lane == LANES {
-                self.blocks.push(RidgeBlock::empty(origin));
-                lane = 0;
-            }
-            let ends = edge.vertices.map(|v| local(surface.vertices[v as usize], origin));
-            if let Some(block) = self.blocks.last_mut() {
-                let cone = Cone::wide(edge.normal, edge.cone);
-                block.set(lane, index, ends, cone, (within as f32).next_up());
-            }
-            lane += 1;
-        }
-        self.range[leaf as usize] = [begin as u32 + 1, self.blocks.len() as u32];
-        self.gathered.push(leaf);
-        (begin, self.blocks.len())
-    }
-}
-
-/// A point about an origin, in single precision.
-#[inline(always)]
-fn local(p: Vec3, origin: [f32; 3]) -> [f32; 3] {
-    [0, 1, 2].map(|k| (p[k] - f64::from(origin[k])) as f32)
 }
 
 /// How close the middle of an edge must come to another edge to show more than its ends do; zero when an end lies inside.
 #[inline(always)]
-fn reach(edge: &Edge, side: &Side, pair: Pair<'_>, least: f64) -> f64 {
-    let [a, b] = edge.vertices;
+fn reach(surface: &Surface, edge: u32, side: &Side, pair: Pair<'_>, least: f64) -> f64 {
+    let [a, b] = surface.edges[edge as usize].vertices;
     let (a, b) = (side.signed_distance(a), side.signed_distance(b));
     let ends = a.min(b);
     if ends <= 0.0 {
@@ -144,93 +104,135 @@ pub(super) fn find<S: Simd>(
     simd: S,
     pair: Pair<'_>,
     neighbours: &Neighbours,
-    [body, obstacle]: [&Side; 2],
+    sides: [&Side; 2],
     ridges: &mut Ridges,
     sink: &mut Sink<'_>,
 ) {
-    let slack = pair.slack() as f32;
     // Edges may only show more than the vertices did, so the vertices' least distance is what they must beat.
     let least = sink.least.min(pair.tolerance);
     let first = sink.contacts.len();
-    for (i, &Neighbourhood { leaf, begin, end }) in neighbours.of.iter().enumerate() {
-        if ridges.clear[i].holds(pair.travelled, pair.tolerance) {
+    let Ridges { stores, own, clear } = ridges;
+    stores.iter_mut().for_each(|store| store.expect(neighbours.of.len()));
+    for (clear, neighbourhood) in clear.iter_mut().zip(&neighbours.of) {
+        let leaf = &pair.body.leaves[neighbourhood.leaf as usize];
+        if leaf.ridges == 0 || clear.holds(pair.travelled, pair.tolerance) {
             continue;
         }
-        let own = &pair.body.leaves[leaf as usize];
-        ridges.gather_own(pair, body, own, least);
-        if ridges.own.is_empty() {
-            continue;
-        }
-        let axis = pair.motion.direction(own.ridge_cone.axis.map(f64::from)).map(|c| c as f32);
-        let cone = Cone { axis, ..own.ridge_cone };
-        // Directions change as the body turns, distances by no more than it travels.
-        let all = ridges.own.len() == usize::from(own.ridges);
-        let mut lower = f32::INFINITY;
-        for &other in &neighbours.near[begin as usize..end as usize] {
-            let theirs = &pair.obstacle.leaves[other as usize];
-            let facing = theirs.ridges > 0 && cone.faces_cone(&theirs.ridge_cone);
-            if !facing && !all {
-                continue;
-            }
-            for eight in 0..ridges.segments.len() {
-                let (mut mask, meeting, apart) = ridges.segments[eight].near(simd, theirs, slack);
-                lower = if apart < lower { apart } else { lower };
-                mask = if facing && mask != 0 {
-                    mask & ridges.segments[eight].facing(simd, &theirs.ridge_cone)
-                } else {
-                    0
-                };
-                while mask != 0 {
-                    let lane = mask.trailing_zeros() as usize;
-                    mask &= mask - 1;
-                    // Edges that have passed each other lie in leaves that overlap.
-                    let crossing = if meeting >> lane & 1 == 1 { pair.tolerance } else { 0.0 };
-                    let range = ridges.gather(pair, obstacle, other, least);
-                    let ridge = ridges.own[eight * LANES + lane];
-                    for block in &ridges.blocks[range.0..range.1] {
-                        meet(
-                            simd,
-                            pair,
-                            &ridge,
-                            block,
-                            crossing,
-                            |edge| reach(edge, obstacle, pair, least),
-                            sink,
-                        );
-                    }
+        let near = &neighbours.near[neighbourhood.begin as usize..neighbourhood.end as usize];
+        let own_reach = |edge| reach(pair.body, edge, sides[0], pair, least);
+        let lower =
+            of_leaf(simd, pair, neighbourhood.leaf, near, stores, own, own_reach, |a, b, crossing| {
+                let within = own_reach(a).min(reach(pair.obstacle, b, sides[1], pair, least));
+                if within > 0.0
+                    && let Some(found) = judge(pair, &Ridge::new(pair, a), b, within, crossing)
+                {
+                    sink.push(found);
                 }
-            }
-        }
-        if all {
-            ridges.clear[i] = Clear::new(f64::from(lower), pair.travelled);
-        }
+            });
+        *clear = Clear::new(f64::from(lower), pair.travelled);
     }
     sink.sort_from(first);
 }
 
+/// Hands on all pairs of edges that may touch, one of a leaf of the body and one of the leaves near it, and up to which distance they may have
+/// passed each other. Gives a lower bound of the distance of any edge from any of the leaves.
 #[inline(always)]
-fn meet<S: Simd>(
+fn of_leaf<S: Simd>(
     simd: S,
     pair: Pair<'_>,
-    ridge: &Ridge,
-    block: &RidgeBlock,
-    crossing: f64,
-    reach: impl Fn(&Edge) -> f64,
-    sink: &mut Sink<'_>,
-) {
-    let start = local(ridge.start, block.origin);
-    let along = ridge.along.map(|c| c as f32);
-    let (within, crossing32) = ((ridge.within as f32).next_up(), (crossing as f32).next_up());
-    let mut mask = block.meeting(simd, start, along, &ridge.cone, within, crossing32);
-    while mask != 0 {
-        let lane = mask.trailing_zeros() as usize;
-        mask &= mask - 1;
-        let other = &pair.obstacle.edges[block.edge[lane] as usize];
-        let within = ridge.within.min(reach(other));
-        if let Some(found) = judge(pair, ridge, block.edge[lane], within, crossing) {
-            sink.push(found);
+    index: u32,
+    near: &[u32],
+    [store, other_store]: &mut [RidgeStore; 2],
+    own: &mut Vec<Own>,
+    reach: impl Fn(u32) -> f64,
+    mut hand_on: impl FnMut(u32, u32, f64),
+) -> f32 {
+    let (slack, tolerance) = (pair.slack() as f32, (pair.tolerance as f32).next_up());
+    let leaf = &pair.body.leaves[index as usize];
+    let block = &pair.body.blocks[index as usize];
+    let (radius, origin) = (block.radius(), pair.motion.point(block.origin.map(f64::from)));
+    let origin32 = [origin[0] as f32, origin[1] as f32, origin[2] as f32];
+    let own = move_ridges(simd, store.of(pair.body, index), &pair.rotation32(), origin32, own);
+    let axis = pair.motion.direction(leaf.ridge_cone.axis.map(f64::from));
+    let cone = Cone { axis: [axis[0] as f32, axis[1] as f32, axis[2] as f32], ..leaf.ridge_cone };
+    let mut lower = f32x8::splat(simd, f32::INFINITY);
+    for &other in near {
+        let theirs = &pair.obstacle.leaves[other as usize];
+        let facing = theirs.ridges > 0 && cone.faces_cone(&theirs.ridge_cone);
+        for (eight, block) in own.iter_mut().enumerate() {
+            let apart = block.moved.segments.apart(simd, theirs, slack);
+            lower = lower.min(apart);
+            if !facing {
+                continue;
+            }
+            let mut mask = kernel::bits(apart.simd_lt(tolerance));
+            if mask != 0 {
+                mask &= block.moved.facing(simd, &theirs.ridge_cone) & RidgeBlock::filled(leaf, eight);
+            }
+            if mask == 0 {
+                continue;
+            }
+            let within = block.within(leaf, eight, &reach);
+            mask &= kernel::bits(apart.simd_lt(kernel::lanes(simd, &within)));
+            let touching = kernel::bits(apart.simd_le(0.0));
+            let block32 = &pair.obstacle.blocks[other as usize];
+            let from = local(origin, block32.origin);
+            let far = from[0].abs() + from[1].abs() + from[2].abs() + 3.0 * (radius + block32.radius());
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                // Edges that have passed each other lie in leaves that overlap.
+                let (crossing, within) =
+                    if touching >> lane & 1 == 1 { (pair.tolerance, tolerance) } else { (0.0, within[lane]) };
+                let ridge = block.moved.edge(lane, from);
+                let number = leaf.first_edge + (eight * LANES + lane) as u32;
+                for (group, blocks) in other_store.of(pair.obstacle, other).iter().enumerate() {
+                    let mask = meeting(simd, &ridge, blocks, within, far) & RidgeBlock::filled(theirs, group);
+                    let first = theirs.first_edge + (group * LANES) as u32;
+                    set_bits(mask, |lane| hand_on(number, first + lane, crossing));
+                }
+            }
         }
     }
+    lower.reduce_min()
+}
+
+/// Turns the ridges of a leaf of the body into the obstacle's frame, where the leaf's origin is at `origin`.
+#[inline(always)]
+fn move_ridges<'a, S: Simd>(
+    simd: S,
+    blocks: &[RidgeBlock],
+    rotation: &[[f32; 3]; 3],
+    origin: [f32; 3],
+    own: &'a mut Vec<Own>,
+) -> &'a mut [Own] {
+    if own.len() < blocks.len() {
+        own.resize(blocks.len(), Own { moved: MovedRidges::EMPTY, within: None });
+    }
+    for (own, block) in own.iter_mut().zip(blocks) {
+        own.moved.set(simd, block, rotation, origin);
+        own.within = None;
+    }
+    &mut own[..blocks.len()]
+}
+
+/// Calls a function with the number of each bit that is set, from the lowest.
+#[inline(always)]
+fn set_bits(mut mask: u32, mut call: impl FnMut(u32)) {
+    while mask != 0 {
+        call(mask.trailing_zeros());
+        mask &= mask - 1;
+    }
+}
+
+/// A point in single precision, as seen from another one.
+#[inline(always)]
+fn local(from: Vec3, p: [f32; 3]) -> [f32; 3] {
+    [
+        (f64::from(p[0]) - from[0]) as f32,
+        (f64::from(p[1]) - from[1]) as f32,
+        (f64::from(p[2]) - from[2]) as f32,
+    ]
 }
 
 /// The contact of two edges, when their common perpendicular is short enough and one that surfaces with these edges can touch along.

@@ -165,9 +165,12 @@ fn probes_of_leaf<S: Simd>(
 ) -> f64 {
     let &Neighbourhood { leaf, begin, end } = of;
     let near = &search.neighbours.near[begin as usize..end as usize];
-    scratch.bounds.clear();
-    for eight in near.chunks(LANES) {
-        scratch.bounds.push(LeafBounds::gather(search.other, eight));
+    let groups = near.len().div_ceil(LANES);
+    if scratch.bounds.len() < groups {
+        scratch.bounds.resize(groups, LeafBounds::EMPTY);
+    }
+    for (bounds, eight) in scratch.bounds.iter_mut().zip(near.chunks(LANES)) {
+        bounds.gather(search.other, eight);
     }
     let within = (search.tolerance as f32).next_up();
     let limit = within * within * ROUNDING;
@@ -178,7 +181,7 @@ fn probes_of_leaf<S: Simd>(
         let point32 = point.map(|c| c as f32);
         let lowers = scratch.lowers.len();
         let mut least = (f32::INFINITY, 0);
-        for (group, bounds) in scratch.bounds.iter().enumerate() {
+        for (group, bounds) in scratch.bounds[..groups].iter().enumerate() {
             let lower = bounds.lower(search.simd, point32, search.slack);
             let own = lower.reduce_min();
             if own < least.0 {

@@ -1,8 +1,8 @@
 //! The walk through both trees: which leaves of the two surfaces come close to each other.
 
 use super::Pair;
-use super::kernel::{self, Box32, Corners};
-use crate::surface::{EMPTY, LANES, LEAF, Leaf, Node, Surface};
+use super::bounds::{self, Bounds, Corners, MovedChildren, Slab};
+use crate::surface::{EMPTY, LANES, LEAF, Node, Surface};
 use crate::vector::{Rigid, Vec3, norm};
 use fearless_simd::Simd;
 
@@ -89,14 +89,15 @@ pub(super) fn walk<S: Simd>(simd: S, pair: Pair<'_>, ahead: f64, walk: &mut Walk
     while let Some(frame) = walk.stack.pop() {
         walk.candidates.truncate(frame.end as usize);
         let node = &pair.body.nodes[frame.node as usize];
-        let boxes = kernel::moved_children(node, pair.motion, margins.near);
+        let children = MovedChildren::new(simd, node, pair.motion);
         for lane in 0..LANES {
             let child = node.child[lane];
             if child == EMPTY {
                 continue;
             }
             let begin = walk.candidates.len() as u32;
-            refine(simd, pair.obstacle, walk, frame, &boxes[lane], child & LEAF != 0);
+            let bounds = children.of(lane);
+            refine(simd, pair.obstacle, walk, frame, &bounds, margins.near, child & LEAF != 0);
             let end = walk.candidates.len() as u32;
             if begin == end {
                 continue;
@@ -115,24 +116,32 @@ pub(super) fn walk<S: Simd>(simd: S, pair: Pair<'_>, ahead: f64, walk: &mut Walk
     }
 }
 
-/// Appends to the candidates those of the frame that overlap `b`, opened down to about its size or, for a leaf, to leaves.
+/// Appends to the candidates those of the frame that may be within the margin of `b`, opened down to about its size or, for a leaf, to leaves.
 #[inline(always)]
-fn refine<S: Simd>(simd: S, obstacle: &Surface, walk: &mut Walk, frame: Frame, b: &Box32, to_leaves: bool) {
-    let extent = b.extent();
+fn refine<S: Simd>(
+    simd: S,
+    obstacle: &Surface,
+    walk: &mut Walk,
+    frame: Frame,
+    b: &Bounds,
+    margin: f32,
+    to_leaves: bool,
+) {
+    let extent = b.extent(margin);
     for i in frame.begin..frame.end {
         let candidate = walk.candidates[i as usize];
         if candidate & LEAF != 0 {
             let leaf = &obstacle.leaves[(candidate & !LEAF) as usize];
-            if b.overlaps(&leaf.min, &leaf.max) {
+            if !b.misses(leaf, margin) {
                 walk.candidates.push(candidate);
             }
             continue;
         }
-        // The node's own box was seen to overlap the parent of `b`; look at its children.
+        // The node's own box was seen to be near the parent of `b`; look at its children.
         walk.pending.push(candidate);
         while let Some(open) = walk.pending.pop() {
             let node = &obstacle.nodes[open as usize];
-            let mut mask = kernel::overlapping_children(simd, node, b);
+            let mut mask = bounds::children_near(simd, node, b, margin);
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize;
                 mask &= mask - 1;
@@ -157,7 +166,8 @@ fn child_extent(node: &Node, lane: usize) -> f32 {
 fn meet_leaf<S: Simd>(simd: S, pair: Pair<'_>, walk: &mut Walk, index: u32, begin: usize, margins: Margins) {
     let leaf = &pair.body.leaves[index as usize];
     let corners = Corners::moved(simd, &pair.body.blocks[index as usize], pair.motion);
-    let [grown, touching] = [margins.near, margins.touching].map(|margin| corners.bounds(margin));
+    let own = corners.bounds();
+    let (grown, touching) = (own.grown(margins.near), own.grown(margins.touching));
     let slab = Slab::of(leaf, pair.motion);
     let first = [walk.near.body.near.len(), walk.touching.body.near.len()];
     for i in begin..walk.candidates.len() {
@@ -207,45 +217,6 @@ fn invert(counts: &mut Vec<u32>, pairs: &mut Pairs, leaves: usize) {
             obstacle.near[*place as usize] = leaf;
             *place += 1;
         }
-    }
-}
-
-/// The space between two parallel planes.
-struct Slab {
-    normal: [f32; 3],
-    low: f32,
-    high: f32,
-}
-
-impl Slab {
-    #[inline(always)]
-    fn of_own(leaf: &Leaf) -> Self {
-        Self { normal: leaf.normal, low: leaf.low, high: leaf.high }
-    }
-
-    #[inline(always)]
-    fn of(leaf: &Leaf, motion: &Rigid) -> Self {
-        let normal = motion.direction(leaf.normal.map(f64::from));
-        let shift = crate::vector::dot(normal, motion.translation) as f32;
-        Self { normal: normal.map(|c| c as f32), low: leaf.low + shift, high: leaf.high + shift }
-    }
-
-    /// How far from it things between these heights are; negative when they overlap.
-    #[inline(always)]
-    fn apart(&self, (low, high): (f32, f32)) -> f32 {
-        (low - self.high).max(self.low - high)
-    }
-
-    /// True when the box is farther than `margin` from the slab.
-    #[inline(always)]
-    fn misses(&self, min: &[f32; 3], max: &[f32; 3], margin: f32) -> bool {
-        let mut center = 0.0;
-        let mut half = margin;
-        for k in 0..3 {
-            center += self.normal[k] * (0.5 * (min[k] + max[k]));
-            half += self.normal[k].abs() * (0.5 * (max[k] - min[k]));
-        }
-        center - half > self.high || center + half < self.low
     }
 }
 

@@ -1,7 +1,7 @@
 //! Building a [`Surface`]: order the triangles into leaves of eight, renumber everything in that order, collapse the
 //! binary tree into an eight-wide one.
 
-use super::{Cone, EMPTY, Edge, EdgeKind, LANES, LEAF, Leaf, Node, Surface, TriangleBlock, topology};
+use super::{Cone, Edge, EdgeKind, LANES, LEAF, Leaf, Node, Surface, TriangleBlock, topology};
 use crate::vector::{Vec3, add, cross, dot, norm, sub, unit_or_zero};
 
 /// An axis-aligned box.
@@ -71,7 +71,7 @@ pub(super) fn surface(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Surface {
     renumber(&mut result, &builder);
     (result.edges_at_begin, result.edges_at) = topology::edges_at(result.vertices.len(), &result.edges);
     result.closed = result.edges.iter().all(|e| matches!(e.kind, EdgeKind::Convex | EdgeKind::Hollow));
-    result.nodes = collapse(&builder.branches);
+    result.nodes = collapse(&result, &builder.branches);
     result.identity = digest(&result);
     result
 }
@@ -263,8 +263,8 @@ fn pick<T: Copy>(list: &[T], order: &[u32]) -> Vec<T> {
 }
 
 /// The binary tree with up to eight descendants of each kept branch as its children, largest opened first.
-fn collapse(branches: &[Branch]) -> Vec<Node> {
-    let mut leaf_index = vec![0u32; branches.len()];
+fn collapse(surface: &Surface, branches: &[Branch]) -> Vec<Node> {
+    let mut leaf_index = vec![0; branches.len()];
     let mut leaves = 0;
     for (i, branch) in branches.iter().enumerate() {
         if branch.children.is_none() {
@@ -272,46 +272,58 @@ fn collapse(branches: &[Branch]) -> Vec<Node> {
             leaves += 1;
         }
     }
-    let mut nodes = Vec::new();
+    let mut collapse = Collapse { surface, branches, leaf_index, nodes: Vec::new() };
     if !branches.is_empty() {
-        collapse_from(0, branches, &leaf_index, &mut nodes);
+        collapse.from(0);
     }
-    nodes
+    collapse.nodes
 }
 
-fn collapse_from(root: usize, branches: &[Branch], leaf_index: &[u32], nodes: &mut Vec<Node>) -> u32 {
-    let mut open = vec![root];
-    while open.len() < LANES {
-        let largest = open
-            .iter()
-            .enumerate()
-            .filter_map(|(i, &b)| branches[b].children.map(|c| (branches[b].bounds.half_area(), i, c)))
-            .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
-        let Some((_, position, [left, right])) = largest else {
-            break;
-        };
-        open[position] = left;
-        open.insert(position + 1, right);
-    }
-    let index = nodes.len();
-    nodes.push(Node {
-        min: [[f32::INFINITY; LANES]; 3],
-        max: [[f32::NEG_INFINITY; LANES]; 3],
-        child: [EMPTY; LANES],
-    });
-    for (lane, &branch) in open.iter().enumerate() {
-        let child = match branches[branch].children {
-            None => LEAF | leaf_index[branch],
-            Some(_) => collapse_from(branch, branches, leaf_index, nodes),
-        };
-        let node = &mut nodes[index];
-        node.child[lane] = child;
-        for axis in 0..3 {
-            node.min[axis][lane] = below(branches[branch].bounds.min[axis]);
-            node.max[axis][lane] = above(branches[branch].bounds.max[axis]);
+struct Collapse<'a> {
+    surface: &'a Surface,
+    branches: &'a [Branch],
+    leaf_index: Vec<u32>,
+    nodes: Vec<Node>,
+}
+
+impl Collapse<'_> {
+    /// Makes the node over a branch and all below it; gives its number.
+    fn from(&mut self, root: usize) -> u32 {
+        let branches = self.branches;
+        let mut open = vec![root];
+        while open.len() < LANES {
+            let largest = open
+                .iter()
+                .enumerate()
+                .filter_map(|(i, &b)| branches[b].children.map(|c| (branches[b].bounds.half_area(), i, c)))
+                .max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+            let Some((_, position, [left, right])) = largest else {
+                break;
+            };
+            open[position] = left;
+            open.insert(position + 1, right);
         }
+        let index = self.nodes.len();
+        self.nodes.push(Node::EMPTY);
+        for (lane, &place) in open.iter().enumerate() {
+            let branch = &branches[place];
+            let child = match branch.children {
+                None => LEAF | self.leaf_index[place],
+                Some(_) => self.from(place),
+            };
+            let triangles: Vec<u32> = (branch.begin as u32..branch.end as u32).collect();
+            let (normal, low, high) = slab(self.surface, &triangles);
+            let node = &mut self.nodes[index];
+            node.child[lane] = child;
+            (node.low[lane], node.high[lane]) = (low, high);
+            for axis in 0..3 {
+                node.min[axis][lane] = below(branch.bounds.min[axis]);
+                node.max[axis][lane] = above(branch.bounds.max[axis]);
+                node.normal[axis][lane] = normal[axis];
+            }
+        }
+        index as u32
     }
-    index as u32
 }
 
 /// The nearest single-precision number that is not above `value`.

@@ -72,8 +72,14 @@ impl Cone {
     /// The cone around a unit vector with (almost) this cosine, on the safe side.
     #[inline(always)]
     pub(crate) fn wide(axis: [f32; 3], cos: f32) -> Self {
-        let cos = (cos - 1.5 * Self::SLACK).max(-1.0);
+        let cos = Self::wide_cos(cos);
         Self { axis, cos, sin: (1.0 - cos * cos).max(0.0).sqrt() }
+    }
+
+    /// The cosine of such a cone.
+    #[inline(always)]
+    pub(crate) fn wide_cos(cos: f32) -> f32 {
+        (cos - 1.5 * Self::SLACK).max(-1.0)
     }
 
     /// True when some direction of this cone may be opposite to one of the other.
@@ -119,13 +125,29 @@ impl Leaf {
     }
 }
 
-/// Eight children with their boxes by axis and lane.
+/// Eight children with their boxes and slabs by axis and lane.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(crate) struct Node {
     pub min: [[f32; LANES]; 3],
     pub max: [[f32; LANES]; 3],
+    /// Mean normals of the children's triangles, and between which heights along them these lie; zero where the normals cancel.
+    pub normal: [[f32; LANES]; 3],
+    pub low: [f32; LANES],
+    pub high: [f32; LANES],
     pub child: [u32; LANES],
+}
+
+impl Node {
+    /// A node without children: its boxes overlap nothing.
+    const EMPTY: Self = Self {
+        min: [[f32::INFINITY; LANES]; 3],
+        max: [[f32::NEG_INFINITY; LANES]; 3],
+        normal: [[0.0; LANES]; 3],
+        low: [0.0; LANES],
+        high: [0.0; LANES],
+        child: [EMPTY; LANES],
+    };
 }
 
 /// A triangle mesh made ready for queries.
