@@ -170,6 +170,18 @@ fn a_budget_that_is_too_small_makes_contacts_fewer() {
     assert!(again * 10 > much * 9, "{much} {again}");
 }
 
+/// Would catch a panic at the smallest tolerance that there is, on the way to levels, which a budget that is too small asks for.
+#[test]
+fn the_smallest_tolerance_does_not_panic() {
+    let models = ball_in_cavity(8);
+    let detail = Detail { budget_us: Some(1e-9), ..Detail::threshold(1e-3) };
+    let mut workspace = LodWorkspace::new();
+    for i in 0..50 {
+        let (contacts, _) = models.levels(&swaying(i), f64::from_bits(1), &detail, &mut workspace);
+        assert!(contacts.iter().all(|c| c.depth.is_finite() && c.weight.is_finite()));
+    }
+}
+
 /// Would catch metrics of view and velocity that are not asked: a near eye wants more contacts than a far one, a fast motion fewer than a
 /// slow one.
 #[test]

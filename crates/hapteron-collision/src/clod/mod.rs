@@ -201,12 +201,6 @@ impl Hierarchy {
         self.nodes.get(node as usize).map(|n| n.level).filter(|level| *level != PURE_HULL)
     }
 
-    /// Greatest distance s between the original surface and the level's where a node is, metres; none as for [`Hierarchy::level_of`].
-    #[must_use]
-    pub fn deviation_of(&self, node: u32) -> Option<f64> {
-        self.level_of(node).map(|_| self.nodes[node as usize].deviation)
-    }
-
     fn patch(&self, node: &Node) -> Patch {
         Patch {
             vertices: self.hull(node).to_vec(),

@@ -265,7 +265,7 @@ pub(super) fn find(
     let mut plan = core::mem::take(&mut front.plan);
     let mut tally = plan.tally;
     let force_from =
-        judge.detail.force_from.unwrap_or(search.tolerance).clamp(f64::MIN_POSITIVE, search.tolerance);
+        judge.detail.force_from.unwrap_or(search.tolerance).min(search.tolerance).max(f64::MIN_POSITIVE);
     for ((sample, clear), held) in plan.samples.iter().zip(&mut plan.clear).zip(&mut plan.held) {
         if *clear > search.travelled + search.tolerance {
             continue;
