@@ -63,7 +63,9 @@ pub fn build(surface: &Surface, folder: Option<&std::path::Path>, out: &mut impl
     let text = match origin {
         Origin::Cached(path) => format!("loaded from {}", path.display()),
         Origin::Built(path) => format!("built, and kept in {}", path.display()),
-        Origin::Rebuilt(path, why) => format!("built anew, for of {} it holds that {why}", path.display()),
+        Origin::Rebuilt(path, why) => {
+            format!("built anew and kept in {}, which was not used: {why}", path.display())
+        }
         Origin::NotCached(why) => format!("built, but not kept: {why}"),
     };
     writeln!(out, "contact levels     {text}")?;
