@@ -19,7 +19,7 @@ use error::Source;
 use hapteron_collision::Surface;
 use hapteron_collision::clod::{Detail, Hierarchy, Lod};
 use hapteron_collision::mesh::TriMesh;
-use hapteron_device::drivers::DriverOptions;
+use hapteron_device::drivers::{self, DriverOptions};
 use hapteron_device::guard::{Guard, GuardSettings};
 use hapteron_device::simulated::SimulatedSettings;
 use hapteron_device::{Capabilities, DeviceSample, HandParameters, Scaling};
@@ -222,11 +222,14 @@ impl Scene {
         Ok(())
     }
 
-    /// The driver and its options; none where the device is simulated.
+    /// The driver and its options; none where the device is simulated. A library that calls the loop is asked to do so once a time step.
     #[must_use]
     pub fn driver(&self) -> Option<(&str, DriverOptions)> {
         let kind = self.file.device.kind.as_deref().filter(|kind| *kind != closed_loop::SIMULATED)?;
         let mut options = DriverOptions::new();
+        if kind == drivers::CALLED_BY_THE_LIBRARY {
+            options.set("rate", (1.0 / self.time_step).round());
+        }
         for (key, value) in &self.file.device.options {
             // A text without its quotes.
             let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
