@@ -13,7 +13,7 @@ use hapteron::scene::{Changes, Scene};
 use hapteron::scenes::spoon_in_cup;
 use hapteron::session::real_time::{End, RealTime, RealTimeOptions, Recorder, Told};
 use hapteron::session::replay;
-use hapteron_emulators::{Generation, HaplyService};
+use hapteron_emulators::{Generation, HaplyService, VrpnServer};
 use nalgebra::Vector3;
 use std::path::Path;
 use std::sync::Arc;
@@ -151,4 +151,43 @@ fn sessions_with_the_vendors_libraries_push_the_hand_and_end_with_the_device() {
         let again = replay(&scene, &recorded.log, &mut |_| true).unwrap();
         assert!(csv(&again) == csv(&recorded.recording), "{kind}: made again it is different");
     }
+}
+
+/// Would catch a VRPN server with which no session starts, a hand that feels nothing or too much, and a session that goes on without its server.
+#[test]
+fn a_session_with_a_vrpn_server_pushes_the_hand_and_ends_with_it() {
+    let server = VrpnServer::start(b"vrpn: ver. 07.35  0\0\0\0\0\0");
+    let options = [
+        ("address", server.address()),
+        ("tracker", "Phantom0"),
+        ("force_device", "Phantom0"),
+        ("patience", "5"),
+    ];
+    let mut scene = scene("vrpn", &options.map(|(key, value)| (key, value.to_owned().into())));
+    let device = {
+        let (kind, options) = scene.driver().unwrap();
+        drivers::open(kind, &options).unwrap()
+    };
+    scene.adopt(device.capabilities()).unwrap();
+    let limit = scene.guard.unwrap().max_force;
+    let scene = Arc::new(scene);
+    let options = RealTimeOptions { watchdog: Duration::from_secs(2), ..RealTimeOptions::of(&scene) };
+    let mut running = RealTime::start(Arc::clone(&scene), device, options).unwrap();
+    let (started, mut greatest, mut felt) = (Instant::now(), 0.0_f64, 0.0_f64);
+    while !running.is_over() && started.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(5));
+        running.drain(&mut |_| {});
+        let ticks = running.timing().ticks;
+        let mut state = server.state();
+        // A single is a little more or less than the force that it was made from.
+        greatest = greatest.max(state.field.1.norm());
+        felt = felt.min(state.field.1.x);
+        if ticks > 200 {
+            state.hand.target.x = 0.03;
+        }
+        state.hang_up |= ticks > 2000;
+    }
+    let finished = running.stop();
+    assert_eq!(finished.end, End::Device(DeviceFault::Disconnected));
+    assert!(felt < -0.5 && greatest <= limit * (1.0 + 1e-6), "{felt} N back, up to {greatest} N");
 }
