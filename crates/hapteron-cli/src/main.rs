@@ -11,6 +11,7 @@ mod report;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
+use progress::say;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -32,7 +33,7 @@ fn main() -> ExitCode {
         Ok(code) => code,
         Err(error) if closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", message(&error));
+            say!("error: {}", message(&error));
             ExitCode::FAILURE
         }
     }

@@ -1,23 +1,41 @@
-//! Progress bars and Ctrl-C.
+//! Progress bars, messages and Ctrl-C.
 
 use indicatif::{ProgressBar, ProgressStyle};
+use std::io::Write;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// A message on stderr, as `eprintln!`, but where nobody reads any more - a terminal that was closed, a pipe that has ended - it is lost without a panic: a
+/// session ends as it should and its files are completed.
+macro_rules! say {
+    ($($text:tt)*) => {
+        $crate::progress::tell(format_args!($($text)*))
+    };
+}
+pub(crate) use say;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 static HANDLER: OnceLock<()> = OnceLock::new();
+static FIRST: OnceLock<Instant> = OnceLock::new();
 
-/// From now on Ctrl-C does not kill the program but makes [`interrupted`] true; a second one kills it.
+/// For so long after the first Ctrl-C a second one kills nothing: keys repeat, and a device is to be stopped before the program ends.
+const GRACE: Duration = Duration::from_secs(1);
+
+/// From now on Ctrl-C (and SIGTERM, and the end of the terminal) does not kill the program but makes [`interrupted`] true; one more, later than
+/// [`GRACE`], kills it.
 pub fn catch_interrupt() {
     HANDLER.get_or_init(|| {
         let installed = ctrlc::set_handler(|| {
-            if INTERRUPTED.swap(true, Ordering::SeqCst) {
+            let first = FIRST.get_or_init(Instant::now);
+            if !INTERRUPTED.swap(true, Ordering::SeqCst) {
+                say!("\nstopping; once more to kill");
+            } else if first.elapsed() > GRACE {
                 std::process::exit(130);
             }
-            eprintln!("\nstopping; once more to kill");
         });
         if let Err(error) = installed {
-            eprintln!("warning: Ctrl-C will not end the run cleanly: {error}");
+            say!("warning: Ctrl-C will not end the run cleanly: {error}");
         }
     });
 }
@@ -25,6 +43,11 @@ pub fn catch_interrupt() {
 /// Whether Ctrl-C was pressed.
 pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::SeqCst)
+}
+
+/// Writes a message to stderr; see [`say!`].
+pub fn tell(message: std::fmt::Arguments<'_>) {
+    let _ = writeln!(std::io::stderr().lock(), "{message}");
 }
 
 /// A bar of `steps` on stderr; nothing when stderr is not a terminal.

@@ -46,6 +46,32 @@ fn ctrl_c_leaves_a_whole_run_folder() {
     assert!(folder.read("again/run.csv") == folder.read("r/run.csv"), "made again it is different");
 }
 
+/// Would catch a run that ends in a panic, its files as they were, because nobody reads its messages any more (a terminal that was closed, a `tee` that Ctrl-C
+/// ended first), one that a key that repeats kills before its device is stopped, and one that Ctrl-Z stops with a force on the hand.
+#[test]
+fn a_closed_terminal_and_hasty_keys_leave_a_whole_run_folder() {
+    let folder = Folder::new("closed");
+    let mut child = begun(&folder, 300_000);
+    if cfg!(target_os = "linux") {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+        let ignored = status.lines().find_map(|l| l.strip_prefix("SigIgn:")).unwrap().trim();
+        // SIGTSTP is 20, counted from 1.
+        assert_eq!(u64::from_str_radix(ignored, 16).unwrap() >> 19 & 1, 1, "Ctrl-Z would stop it: {ignored}");
+    }
+    drop((child.stderr.take(), child.stdout.take()));
+    let id = child.id();
+    let twice = format!("kill -HUP {id}; kill -INT {id}");
+    assert!(Command::new("sh").args(["-c", &twice]).status().unwrap().success());
+    let code = child.wait().unwrap().code();
+    // That nobody can be told the summary is what is wrong, or that the run was not over: no panic, no kill.
+    assert!(code == Some(0) || code == Some(1), "{code:?}");
+    let rows = Recording::load(folder.path().join("r/run.csv")).unwrap().rows.len();
+    let timing: serde_json::Value = serde_json::from_str(&folder.read("r/timing.json")).unwrap();
+    assert_eq!(timing["ticks"].as_u64(), Some(rows as u64));
+    assert!(folder.read("r/report.html").trim_end().ends_with("</html>"));
+    assert!(!folder.path().join("r/run.part").exists());
+}
+
 /// Would catch rows that are in the memory of the process when it dies.
 #[test]
 fn a_process_that_is_killed_leaves_what_was() {

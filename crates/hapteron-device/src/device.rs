@@ -121,6 +121,11 @@ pub trait Device: Send {
     /// What it can do. The same for its whole life.
     fn capabilities(&self) -> &Capabilities;
 
+    /// Whether nobody's hand is in it: it is computed. Only such a device can be driven without a guard.
+    fn is_simulated(&self) -> bool {
+        false
+    }
+
     /// Finds out where the handle is, if that takes a motion or the user's help. Set-up: may take seconds.
     ///
     /// # Errors

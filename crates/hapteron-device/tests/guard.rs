@@ -121,6 +121,36 @@ fn stale_contacts_and_samples_fade_and_come_back_on_a_ramp() {
     }
 }
 
+/// Would catch a blow after the program stood still and the hand went on: the whole force within the slew.
+#[test]
+fn after_a_gap_the_force_begins_anew_on_its_ramp() {
+    for (gap, anew) in [(0.04, false), (0.06, true), (3.0, true)] {
+        let mut guard = Guard::new(premium()).unwrap();
+        let mut tick = 0;
+        hold(&mut guard, &mut tick, 300, pushing(4.0));
+        let later = |tick: u32| {
+            let input = input(pushing(8.0), at(Vector3::new(0.05, 0.0, 0.0)), tick);
+            GuardInput {
+                time: input.time + gap,
+                sample: DeviceSample { time: input.time + gap, ..input.sample },
+                ..input
+            }
+        };
+        let mut greatest = 0.0_f64;
+        for i in 1..=50 {
+            let guarded = guard.pass(&later(tick + i));
+            greatest = greatest.max(if i > 5 { guarded.command.force.z } else { 0.0 });
+            assert_eq!(guarded.status.contains(GuardStatus::RAMPING), anew, "{gap} s, tick {i}");
+        }
+        // After what was there is gone: of 8 N so much as the ramp gives in 50 ms.
+        assert!(if anew { greatest < 8.0 * 0.052 / 0.25 } else { greatest > 7.9 }, "{gap} s: {greatest} N");
+        assert_eq!(guard.fault(), None);
+        // And it comes back.
+        let last = (51..=300).map(|i| guard.pass(&later(tick + i)).command.force.z).last();
+        assert!((last.unwrap() - 8.0).abs() < 1e-9);
+    }
+}
+
 /// Would catch a force that lives on when a thread has died.
 #[test]
 fn what_stays_away_for_a_second_is_a_fault() {

@@ -204,7 +204,14 @@ fn malformed_and_troubled() {
         device.set_force_enabled(true).unwrap();
         run(&mut *device, 3, |_| push(2.0));
     }
-    assert_eq!(device.write(&push(f64::INFINITY)).unwrap_err(), DeviceFault::Malformed);
+    // The last goes out in single precision.
+    for bad in [f64::INFINITY, f64::NAN, 1e39] {
+        let server = VrpnServer::start(COOKIE);
+        let mut device = ready(&server);
+        run(&mut *device, 3, |_| push(2.0));
+        assert_eq!(device.write(&push(bad)).unwrap_err(), DeviceFault::Malformed);
+        eventually(&server, |s| s.field.1 == Vector3::zeros());
+    }
 }
 
 /// Guards silence, the end of the server, and a server that reads no more: bounded, told, and without a force that stands.

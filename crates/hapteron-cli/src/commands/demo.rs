@@ -3,6 +3,7 @@
 use super::real_time::{self, Plan};
 use crate::arguments::Demo;
 use crate::commands::run::{checked, free_folder, run_into};
+use crate::progress::say;
 use anyhow::Result;
 use hapteron::scene::Scene;
 use hapteron::scenes;
@@ -15,7 +16,7 @@ pub fn demo(arguments: &Demo) -> Result<ExitCode> {
     } else {
         "in real time, beside a loop that does nothing, for comparison"
     };
-    eprintln!(
+    say!(
         "The upper jaw (47,340 triangles) in a simulated hand is held on the lower one (40,180), at 1 kHz, {time}."
     );
     let scene = Scene::from_file(scenes::demo())?;

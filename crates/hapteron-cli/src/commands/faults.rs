@@ -1,6 +1,7 @@
 //! Faults that take the force away while a session runs: told at once, and re-armed by whoever sits at the terminal.
 
 use crate::arguments::OnFault;
+use crate::progress::say;
 use hapteron::session::real_time::{Running, TickRecord};
 use hapteron::session::{Command, CommandError};
 use std::io::{BufRead, IsTerminal};
@@ -38,17 +39,17 @@ impl Watch {
         match (self.latched(), no_force) {
             (false, true) => {
                 let reason = reason(record);
-                eprintln!("\nno force since {:.3} s: {reason}", record.time);
+                say!("\nno force since {:.3} s: {reason}", record.time);
                 match self.on_fault {
-                    OnFault::Wait => eprintln!(
+                    OnFault::Wait => say!(
                         "Enter: force again, from where the handle is then (it comes slowly). Ctrl-C: the end."
                     ),
-                    OnFault::End => eprintln!("the session ends (--on-fault wait lets you go on)"),
+                    OnFault::End => say!("the session ends (--on-fault wait lets you go on)"),
                 }
                 self.faults.push(Fault { time: record.time, reason, rearmed: None });
             }
             (true, false) => {
-                eprintln!("force again since {:.3} s", record.time);
+                say!("force again since {:.3} s", record.time);
                 if let Some(fault) = self.faults.last_mut() {
                     fault.rearmed = Some(record.time);
                 }

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 #[cfg(feature = "window")]
 pub fn live(arguments: &Live) -> Result<ExitCode> {
     use hapteron_window::{Options, Source};
+    hapteron::session::real_time::system::ignore_suspend();
     let open = match (&arguments.file, &arguments.scene) {
         (Some(path), _) => Some(Source::File(path.clone())),
         (None, Some(name)) => Some(Source::Builtin(name.clone())),

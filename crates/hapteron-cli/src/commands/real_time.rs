@@ -3,13 +3,14 @@
 use super::faults::{Fault, Watch};
 use super::run::{begin, finish};
 use crate::arguments::OnFault;
-use crate::progress;
+use crate::progress::{self, say};
 use crate::report::{self, Digest, Live, Outcome, Time};
 use anyhow::{Context, Result, bail};
 use hapteron::device::{Device, drivers};
 use hapteron::scene::Scene;
 use hapteron::session::real_time::{
     Finished, PassRecord, RealTime, RealTimeOptions, Running, SceneDevice, Spool, Spooled, TickRecord, Told,
+    system,
 };
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -40,6 +41,7 @@ const LINE: Duration = Duration::from_millis(500);
 pub fn run_into(mut scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode> {
     let notes = begin(&scene, folder)?;
     progress::catch_interrupt();
+    system::ignore_suspend();
     let driver = scene.driver().filter(|_| !plan.recorded_motion);
     let real = match driver {
         Some((kind, options)) => Some(drivers::open(kind, &options)?),
@@ -61,8 +63,8 @@ pub fn run_into(mut scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode
     // Before the motors are on: what cannot be recorded is known now.
     let spool = Spool::create(Arc::clone(&scene), folder)?;
     let running = RealTime::start(Arc::clone(&scene), device, options)?;
-    eprintln!("haptic thread: {}; memory {}", running.grants().priority, running.grants().memory);
-    let (finished, spooled, faults) = follow(running, spool, Watch::new(plan.on_fault))?;
+    say!("haptic thread: {}; memory {}", running.grants().priority, running.grants().memory);
+    let (finished, spooled, faults) = follow(running, spool, Watch::new(plan.on_fault));
     if finished.timing.ticks == 0 {
         bail!("the session ended before its first tick: {}", finished.end);
     }
@@ -86,7 +88,7 @@ pub fn run_into(mut scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode
     let text = serde_json::to_string_pretty(&report::timing_json(&live))?;
     std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     let outcome = Outcome { scene: &scene, digest, time: Time::Real(Box::new(live)) };
-    let code = finish(outcome, duration.unwrap_or_default(), &notes, folder)?;
+    let told = finish(outcome, duration.unwrap_or_default(), &notes, folder);
     if !finished.end.is_regular() {
         bail!("the session ended early: {}", finished.end);
     }
@@ -95,7 +97,8 @@ pub fn run_into(mut scene: Scene, plan: &Plan, folder: &Path) -> Result<ExitCode
     }
     match trouble {
         Some(trouble) => bail!("{trouble}"),
-        None => Ok(code),
+        // After the session's own end: that nobody reads the summary makes no success of a failure.
+        None => told,
     }
 }
 
@@ -115,11 +118,7 @@ fn settle(spooled: &Spooled, cancelled: bool) -> (Digest, Option<String>) {
 }
 
 /// Watches a session to its end, with a live line.
-fn follow(
-    mut running: Running,
-    mut spool: Spool,
-    mut watch: Watch,
-) -> Result<(Finished, Spooled, Vec<Fault>)> {
+fn follow(mut running: Running, mut spool: Spool, mut watch: Watch) -> (Finished, Spooled, Vec<Fault>) {
     let mut line = LiveLine::new();
     let mut in_trouble = false;
     while !running.is_over() && !progress::interrupted() {
@@ -137,19 +136,19 @@ fn follow(
         });
         // A full disk is no reason to take the force out of a hand.
         if let (Some(trouble), false) = (spool.trouble(), in_trouble) {
-            eprintln!("\n{trouble}; the session goes on");
+            say!("\n{trouble}; the session goes on");
             in_trouble = true;
         }
         if watch.react(&mut running) {
             break;
         }
-        line.show(&running)?;
+        line.show(&running);
     }
     let finished = running.stop();
-    line.end()?;
+    line.end();
     finished.records.iter().for_each(|record| watch.tick(record));
     let spooled = spool.finish(&finished.records, &finished.passes);
-    Ok((finished, spooled, watch.into_faults()))
+    (finished, spooled, watch.into_faults())
 }
 
 /// What happens, every half a second, on a terminal.
@@ -176,10 +175,10 @@ impl LiveLine {
         self.depth = self.depth.max(-record.min_distance);
     }
 
-    fn show(&mut self, running: &Running) -> std::io::Result<()> {
+    fn show(&mut self, running: &Running) {
         let passed = self.last.elapsed();
         if passed < LINE {
-            return Ok(());
+            return;
         }
         if self.shown {
             let rate = self.ticks as f64 / passed.as_secs_f64();
@@ -190,22 +189,24 @@ impl LiveLine {
             };
             let timing = running.timing();
             let mut out = std::io::stderr().lock();
-            write!(
+            // A terminal that is gone is no reason to leave the session's files as they are.
+            let _ = write!(
                 out,
                 "\r{:7.1} s  {rate:6.0} Hz  force {:6.2} N  depth {depth:>10}  contacts {:.1} ms old  missed {}   ",
                 timing.ticks as f64 * running.scene().time_step,
                 self.force,
                 timing.contact_age.quantile_ns(0.5) as f64 * 1e-6,
                 timing.missed
-            )?;
-            out.flush()?;
+            );
+            let _ = out.flush();
         }
         *self = Self { last: Instant::now(), ticks: 0, force: 0.0, depth: f64::NEG_INFINITY, ..*self };
-        Ok(())
     }
 
-    fn end(&self) -> std::io::Result<()> {
-        if self.shown { writeln!(std::io::stderr()) } else { Ok(()) }
+    fn end(&self) {
+        if self.shown {
+            say!("");
+        }
     }
 }
 

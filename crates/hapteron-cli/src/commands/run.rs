@@ -2,7 +2,7 @@
 
 use super::real_time::{self, Plan};
 use crate::arguments::Run;
-use crate::progress;
+use crate::progress::{self, say};
 use crate::report::{self, Digest, Outcome, Time};
 use anyhow::{Context, Result, bail};
 use hapteron::recording::{Recording, Summary};
@@ -107,7 +107,7 @@ pub fn begin(scene: &Scene, folder: &Path) -> Result<Vec<String>> {
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let notes = notes(scene);
     for note in &notes {
-        eprintln!("warning: {note}");
+        say!("warning: {note}");
     }
     Ok(notes)
 }
@@ -127,7 +127,7 @@ pub fn finish(outcome: Outcome<'_>, duration: f64, notes: &[String], folder: &Pa
     out.write_all(&text)?;
     writeln!(out, "  {}", path.display())?;
     if cancelled {
-        eprintln!("{}: stopped after {:.3} s of {duration:.3} s", scene.name(), summary.duration);
+        say!("{}: stopped after {:.3} s of {duration:.3} s", scene.name(), summary.duration);
     }
     Ok(if summary.stable && !cancelled { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

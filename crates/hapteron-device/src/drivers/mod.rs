@@ -85,6 +85,9 @@ const DRIVERS: [Driver; 5] = [
     },
 ];
 
+/// The kind whose library calls the loop, at the rate that its option `rate` asks for.
+pub const CALLED_BY_THE_LIBRARY: &str = openhaptics::KIND;
+
 /// The kinds that [`open`] knows.
 pub fn kinds() -> impl Iterator<Item = &'static str> {
     DRIVERS.iter().map(|driver| driver.kind)

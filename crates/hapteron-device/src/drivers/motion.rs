@@ -56,6 +56,11 @@ pub(super) fn vector_is_finite(v: &Vector3<f64>) -> bool {
     v.iter().all(|c| c.is_finite())
 }
 
+/// Whether it is finite in single precision as well, for protocols that carry it so.
+pub(super) fn single_is_finite(v: &Vector3<f64>) -> bool {
+    v.iter().all(|c| (*c as f32).is_finite())
+}
+
 /// A force within a limit, direction kept, and the factor that it took.
 pub(super) fn limited(force: &Vector3<f64>, limit: f64) -> (Vector3<f64>, f64) {
     let size = force.norm();

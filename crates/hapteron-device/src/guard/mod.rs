@@ -25,6 +25,11 @@ const STILL_TICKS: u32 = 20;
 const LOST_AFTER: f64 = 1.0;
 /// A late tick counts as this many at the most, in slews and ramps.
 const LATEST: f64 = 2.0;
+/// A pass that comes later than this after the one before begins anew on the ramp, seconds: whoever stopped the program so long (a debugger, a machine that
+/// was put to sleep), the hand is somewhere else by now, and the whole force at once would be a blow.
+const GAP: f64 = 0.05;
+/// Time steps that are no gap, however long they are.
+const NO_GAP: f64 = 10.0;
 /// Most samples that a device may act late.
 const MOST_DELAY: usize = 2;
 /// A force below this share of the greatest is none, for the passivity observer.
@@ -189,12 +194,15 @@ impl Guard {
         Guarded { command: self.last, status }
     }
 
-    /// Seconds since the last pass, as far as they are believed; counts the passes in which time did not go on.
+    /// Seconds since the last pass, as far as they are believed; counts the passes in which time did not go on, and begins anew after a [`GAP`].
     fn elapsed(&mut self, time: f64) -> f64 {
         let step = self.settings.time_step;
         let Some((before, _)) = self.before else {
             return step;
         };
+        if time - before > GAP.max(NO_GAP * step) {
+            self.gain = 0.0;
+        }
         self.still_ticks = if time > before { 0 } else { self.still_ticks + 1 };
         // A clock that stands still must not hold the force where it is: the tick happened all the same.
         if time > before { (time - before).min(LATEST * step) } else { step }

@@ -211,6 +211,10 @@ impl Device for SimulatedDevice {
         &self.capabilities
     }
 
+    fn is_simulated(&self) -> bool {
+        true
+    }
+
     fn home(&mut self) -> Result<(), DeviceFault> {
         Ok(())
     }

@@ -164,6 +164,7 @@ pub(super) fn write_out(keys: &mut file::Guard, settings: &GuardSettings) {
     keys.stale_after = Some(settings.stale_after);
     keys.max_speed = Some(settings.max_speed);
     keys.passivity = Some(settings.passivity);
+    keys.max_damping = Some(settings.max_damping);
 }
 
 /// The limits for a device: the scene's where it has them, else the device's; of force and torque no more than the device's, where it
@@ -184,10 +185,12 @@ pub(super) fn guard_settings(
     };
     let max_force = least(keys.max_force, device.drives_force, device.peak_force, of_device.max_force);
     let max_torque = least(keys.max_torque, device.drives_torque, device.peak_torque, of_device.max_torque);
-    let usual = GuardSettings {
-        max_damping: of_device.max_damping,
-        ..GuardSettings::within(max_force, max_torque, time_step)
+    let max_damping = match keys.max_damping {
+        None => of_device.max_damping,
+        Some(most) if known => most.min(of_device.max_damping),
+        Some(most) => most,
     };
+    let usual = GuardSettings { max_damping, ..GuardSettings::within(max_force, max_torque, time_step) };
     let max_slew = keys.max_slew.unwrap_or(usual.max_slew);
     GuardSettings {
         delay,

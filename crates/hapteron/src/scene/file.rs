@@ -310,4 +310,6 @@ pub struct Guard {
     pub max_speed: Option<f64>,
     /// Time-domain passivity control; default off.
     pub passivity: Option<bool>,
+    /// Damping of the passivity control at the most, N s/m; default the device's, no more than 5, which is also the most.
+    pub max_damping: Option<f64>,
 }

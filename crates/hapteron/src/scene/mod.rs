@@ -19,7 +19,7 @@ use error::Source;
 use hapteron_collision::Surface;
 use hapteron_collision::clod::{Detail, Hierarchy, Lod};
 use hapteron_collision::mesh::TriMesh;
-use hapteron_device::drivers::DriverOptions;
+use hapteron_device::drivers::{self, DriverOptions};
 use hapteron_device::guard::{Guard, GuardSettings};
 use hapteron_device::simulated::SimulatedSettings;
 use hapteron_device::{Capabilities, DeviceSample, HandParameters, Scaling};
@@ -196,6 +196,10 @@ impl Scene {
     /// # Errors
     /// A limit out of its range.
     pub fn guard_for(&self, device: &Capabilities) -> Result<Option<Guard>, SceneError> {
+        self.guard_of(device, self.driver().is_some())
+    }
+
+    fn guard_of(&self, device: &Capabilities, real: bool) -> Result<Option<Guard>, SceneError> {
         let fault = |e: hapteron_device::guard::GuardError| SceneError {
             file: self.name().to_owned(),
             line: None,
@@ -205,28 +209,34 @@ impl Scene {
         let (keys, delay) = (&self.file.guard, self.simulated.delay);
         let settings = closed_loop::guard_settings(keys, device, true, delay, self.time_step);
         Guard::new(settings).map_err(fault)?;
-        let real = self.file.device.kind.as_deref().is_some_and(|kind| kind != closed_loop::SIMULATED);
         let settings = closed_loop::as_wanted(settings, keys.enabled != Some(false), real);
         settings.map(Guard::new).transpose().map_err(fault)
     }
 
-    /// Takes the limits of a device that is open into the scene, for its guard and for [`Scene::to_toml`].
+    /// Takes the limits of a device that is open into the scene, for its guard and for [`Scene::to_toml`]. A scene that names no real device says nothing of a
+    /// real one's guard, which is on then, although nobody may have felt anything so far.
     ///
     /// # Errors
     /// As [`Scene::guard_for`].
     pub fn adopt(&mut self, device: &Capabilities) -> Result<(), SceneError> {
-        self.guard = self.guard_for(device)?.map(|guard| *guard.settings());
+        if self.driver().is_none() {
+            self.file.guard.enabled = Some(true);
+        }
+        self.guard = self.guard_of(device, true)?.map(|guard| *guard.settings());
         if let Some(settings) = &self.guard {
             closed_loop::write_out(&mut self.file.guard, settings);
         }
         Ok(())
     }
 
-    /// The driver and its options; none where the device is simulated.
+    /// The driver and its options; none where the device is simulated. A library that calls the loop is asked to do so once a time step.
     #[must_use]
     pub fn driver(&self) -> Option<(&str, DriverOptions)> {
         let kind = self.file.device.kind.as_deref().filter(|kind| *kind != closed_loop::SIMULATED)?;
         let mut options = DriverOptions::new();
+        if kind == drivers::CALLED_BY_THE_LIBRARY {
+            options.set("rate", (1.0 / self.time_step).round());
+        }
         for (key, value) in &self.file.device.options {
             // A text without its quotes.
             let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);

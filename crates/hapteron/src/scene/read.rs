@@ -50,6 +50,11 @@ fn set(table: &mut toml::Table, text: &str) -> Result<(), String> {
     let entry = table.entry(table_name).or_insert_with(|| toml::Value::Table(toml::Table::new()));
     let target = match (entry, index) {
         (toml::Value::Table(t), None) => t,
+        // As in device.options.library.
+        (toml::Value::Table(t), Some(inner)) => {
+            let inner_table = t.entry(inner).or_insert_with(|| toml::Value::Table(toml::Table::new()));
+            inner_table.as_table_mut().ok_or_else(|| format!("'{table_name}.{inner}' is not a table"))?
+        }
         (toml::Value::Array(items), index) => {
             let index = match index {
                 Some(i) => {
@@ -129,6 +134,15 @@ mod tests {
         assert_eq!(file.integrator.method, Some(super::super::file::Method::RungeKutta4));
         assert_eq!(file.contact.stiffness, Some(2000.0));
         assert_eq!(file.body.position, Some([1.0, 2.0, 3.0]));
+        let overrides =
+            ["device.options.address=localhost:1", "device.options.patience=0.5"].map(String::from);
+        let options = read(&source, &overrides).unwrap().device.options;
+        assert_eq!(options["address"].as_str(), Some("localhost:1"));
+        assert_eq!(options["patience"].as_float(), Some(0.5));
+        assert!(
+            fault(&format!("{BODY}[contact]\nstiffness=3\n"), &["contact.stiffness.k=1"])
+                .contains("is not a table")
+        );
         assert!(fault(BODY, &["contact.stiff=1"]).starts_with("--set contact.stiff=1: unknown key"));
         assert!(fault(BODY, &["contact"]).contains("table.key=value"));
         assert!(fault(BODY, &["a.b.c.d=1"]).contains("not a key"));

@@ -155,6 +155,23 @@ fn no_scene_takes_a_device_s_limits_away() {
     assert_eq!(parse(&simulated).unwrap().guard.unwrap().max_force, 8.5);
 }
 
+/// Would catch a real device without a guard because its scene was made for a replay or a simulated hand, as when it is chosen in the window.
+#[test]
+fn a_real_device_has_a_guard_in_every_scene() {
+    let device = hapteron_device::simulated::model("touch").unwrap().capabilities();
+    let off = with("hand/grip = \"medium\"") + "[guard]\nenabled = false\n";
+    for text in [SCENE.to_owned(), off] {
+        let mut scene = parse(&text).unwrap();
+        assert!(scene.guard.is_none());
+        scene.adopt(&device).unwrap();
+        let guard = scene.guard.unwrap();
+        assert_eq!((guard.max_force, guard.max_torque, guard.max_damping), (3.3, 0.0, 4.0));
+        assert!(guard.max_slew < 1e4 && guard.max_speed <= 2.0);
+        // Passivity control damps as much when the session is made again.
+        assert_eq!(parse(&scene.to_toml().unwrap()).unwrap().guard, scene.guard);
+    }
+}
+
 /// Would catch buttons or a priority that cannot be, and a priority above the haptic thread's.
 #[test]
 fn buttons_and_priorities_are_checked() {

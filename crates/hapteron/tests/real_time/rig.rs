@@ -51,7 +51,7 @@ pub struct Seen {
 /// The scene's device, with trouble at a read.
 pub struct Troubled {
     inner: SceneDevice,
-    capabilities: Capabilities,
+    pub capabilities: Capabilities,
     trouble: Trouble,
     at: u64,
     seen: Arc<Seen>,

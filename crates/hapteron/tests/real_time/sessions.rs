@@ -2,14 +2,18 @@
 
 use crate::common::csv;
 use crate::rig::{Trouble, Troubled, options, scene, to_end};
+#[cfg(target_os = "linux")]
+use hapteron::device::{Applied, Capabilities, Device, DeviceCommand, DeviceSample};
 use hapteron::device::{DeviceFault, Pacing};
 use hapteron::scene::file::Method;
 use hapteron::scene::{ContactModel, Scene};
 use hapteron::scenes::spoon_in_cup;
 use hapteron::session::real_time::{End, RealTime, RealTimeOptions, SceneDevice, StartError};
 use hapteron::session::{Command, Gains, log::Log, replay};
-use std::sync::Arc;
+#[cfg(target_os = "linux")]
+use std::ffi::OsString;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// Would catch an order of threads, a command or a missed tick that the log does not tell, and a pacing that does not call the same tick:
@@ -77,6 +81,99 @@ fn a_session_that_cannot_start_says_why_and_stops_the_device() {
     let device = Box::new(SceneDevice::new(Arc::clone(&slow), false).unwrap());
     let refused = RealTime::start(slow, device, RealTimeOptions::of(&scene)).err().unwrap();
     assert!(refused.to_string().contains("500 to 8000"), "{refused}");
+}
+
+/// Would catch motors that are on while threads and contacts are still prepared: a device's own watchdog, which waits 20 ms for a force, would take them away before
+/// the first tick.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_motors_are_switched_on_last() {
+    let scene = scene();
+    let threads = Arc::new(Mutex::new((Vec::new(), None)));
+    let device = Box::new(Watched {
+        inner: SceneDevice::new(Arc::clone(&scene), false).unwrap(),
+        threads: Arc::clone(&threads),
+    });
+    let running = RealTime::start(Arc::clone(&scene), device, options(&scene, 0.05)).unwrap();
+    assert_eq!(to_end(running).0.end, End::Elapsed);
+    let (there, haptic) = threads.lock().unwrap().clone();
+    assert!(there.contains(&haptic.unwrap()), "the haptic thread came after the motors");
+}
+
+/// Sees which threads there are when the motors are switched on, and which one writes first.
+#[cfg(target_os = "linux")]
+struct Watched {
+    inner: SceneDevice,
+    threads: Arc<Mutex<(Vec<OsString>, Option<OsString>)>>,
+}
+
+#[cfg(target_os = "linux")]
+impl Device for Watched {
+    fn capabilities(&self) -> &Capabilities {
+        self.inner.capabilities()
+    }
+
+    fn home(&mut self) -> Result<(), DeviceFault> {
+        self.inner.home()
+    }
+
+    fn set_force_enabled(&mut self, enabled: bool) -> Result<(), DeviceFault> {
+        let tasks = std::fs::read_dir("/proc/self/task").unwrap();
+        self.threads.lock().unwrap().0 = tasks.map(|t| t.unwrap().file_name()).collect();
+        self.inner.set_force_enabled(enabled)
+    }
+
+    fn read(&mut self) -> Result<DeviceSample, DeviceFault> {
+        self.inner.read()
+    }
+
+    fn write(&mut self, command: &DeviceCommand) -> Result<Applied, DeviceFault> {
+        let this = std::fs::read_link("/proc/thread-self").unwrap();
+        self.threads.lock().unwrap().1.get_or_insert(this.file_name().unwrap().to_owned());
+        self.inner.write(command)
+    }
+
+    fn stop(&mut self) {
+        self.inner.stop();
+    }
+}
+
+/// Would catch a device that someone's code drives with more than it is made for, or without any guard.
+#[test]
+fn a_device_that_the_guard_is_not_for_is_not_driven() {
+    let strong = scene();
+    let mut file = strong.file.clone();
+    file.guard.enabled = Some(false);
+    let unguarded = Arc::new(Scene::from_file(file).unwrap());
+    assert!(unguarded.guard.is_none());
+    for (scene, peak) in [(&strong, 3.0), (&unguarded, f64::INFINITY)] {
+        let (mut device, seen) = Troubled::new(scene, Pacing::Polled, Trouble::None, u64::MAX);
+        device.capabilities.peak_force = peak;
+        let refused = RealTime::start(Arc::clone(scene), device, options(scene, 0.1)).err().unwrap();
+        assert!(matches!(&refused, StartError::Unguarded(_)), "{refused}");
+        assert!(refused.to_string().contains("Scene::adopt"));
+        assert!(seen.stopped.load(Ordering::SeqCst));
+    }
+    // Taken over by the scene it is driven, and no harder than it is made for.
+    let mut adopted = Scene::clone(&strong);
+    let (mut device, _) = Troubled::new(&strong, Pacing::Polled, Trouble::None, u64::MAX);
+    device.capabilities.peak_force = 3.0;
+    adopted.adopt(&device.capabilities).unwrap();
+    let scene = Arc::new(adopted);
+    assert_eq!(scene.guard.unwrap().max_force, 3.0);
+    let running = RealTime::start(Arc::clone(&scene), device, options(&scene, 0.1)).unwrap();
+    assert_eq!(to_end(running).0.end, End::Elapsed);
+}
+
+/// Would catch a device that calls the loop at another rate, so that the body's time is not the hand's.
+#[test]
+fn a_device_that_calls_at_another_rate_is_told() {
+    let scene = scene();
+    let (mut device, seen) = Troubled::new(&scene, Pacing::Callback, Trouble::None, u64::MAX);
+    device.capabilities.rate = 500.0;
+    let refused = RealTime::start(Arc::clone(&scene), device, options(&scene, 0.1)).err().unwrap();
+    assert!(refused.to_string().contains("integrator.time_step = 0.002"), "{refused}");
+    assert!(seen.stopped.load(Ordering::SeqCst));
 }
 
 /// Would catch threads that outlive their session, or a device that is left on by someone who forgets to stop.

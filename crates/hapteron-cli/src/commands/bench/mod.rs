@@ -6,7 +6,7 @@ mod window;
 
 use crate::arguments::Bench;
 use crate::commands::run::checked;
-use crate::progress;
+use crate::progress::{self, say};
 use crate::report::{self, distribution_json};
 use anyhow::{Result, bail};
 use hapteron::dynamics::{ContactForce, ContactPlane, Method, Problem, step};
@@ -36,14 +36,14 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode> {
     let Some(seconds) = checked(Some(arguments.seconds))? else { bail!("--seconds is missing") };
     progress::catch_interrupt();
     let scene = Arc::new(Scene::from_file(scenes::demo())?);
-    eprintln!("step times ...");
+    say!("step times ...");
     let steps = steps(&scene)?;
-    eprintln!("query times ...");
+    say!("query times ...");
     let queries = queries(&scene)?;
-    eprintln!("a loop that does nothing, {seconds} s ...");
+    say!("a loop that does nothing, {seconds} s ...");
     let options = RealTimeOptions::of(&scene);
     let bare = bare_loop(scene.time_step, seconds, options.priority, options.spin)?;
-    eprintln!("a session, {seconds} s ...");
+    say!("a session, {seconds} s ...");
     let timing = session(&scene, seconds)?;
     if arguments.json {
         let value = json!({

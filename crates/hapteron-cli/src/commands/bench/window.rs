@@ -4,7 +4,7 @@
 //! left alone, moved and resized, or frozen, and closed again. A second series of blocks without a window is the control: what differs
 //! between the two series without one is the machine's doing, not the window's.
 
-use crate::progress;
+use crate::progress::{self, say};
 use anyhow::{Result, bail};
 use hapteron::session::real_time::clock;
 use hapteron_window::trial::{Block, Treatment, Trial};
@@ -97,7 +97,7 @@ pub fn window(seconds: f64, json: bool) -> Result<ExitCode> {
                 bail!("stopped by Ctrl-C");
             }
             let Series { name, kind, .. } = series[index];
-            eprintln!("round {} of {rounds}: {name} ...", round + 1);
+            say!("round {} of {rounds}: {name} ...", round + 1);
             match kind {
                 Kind::Without => {
                     let block = trial.without(BLOCK)?;

@@ -9,7 +9,7 @@ pub use judge::{Outcome, Verdict};
 
 use crate::arguments::Stability;
 use crate::commands::run::free_folder;
-use crate::progress;
+use crate::progress::{self, say};
 use crate::report;
 use anyhow::{Context, Result, bail};
 use hapteron::scene::{Changes, Scene};
@@ -68,7 +68,7 @@ fn common_overrides(arguments: &Stability, axes: &[Axis; 2]) -> Result<Vec<Strin
     }
     let scene = Scene::load(&arguments.scene, &Changes { overrides: common.clone(), replay: None })?;
     if scene.hand.is_none() {
-        eprintln!("note: the scene has no hand; it is held with a medium grip ({USUAL_GRIP})");
+        say!("note: the scene has no hand; it is held with a medium grip ({USUAL_GRIP})");
         common.push(USUAL_GRIP.to_owned());
     }
     Ok(common)

@@ -177,13 +177,12 @@ impl Functions {
         unsafe { (self.hdStopScheduler)() };
     }
 
-    /// A rate that the library does not take is no fault: it stays as it is.
-    pub fn set_rate(&self, hz: u32) {
-        if let Some(set) = self.hdSetSchedulerRate {
-            // SAFETY: a plain value.
-            unsafe { set(c_ulong::from(hz)) };
-            self.first_error();
-        }
+    /// A rate that the library does not take is no fault: it stays as it is. Answers whether it was taken.
+    pub fn set_rate(&self, hz: u32) -> bool {
+        let Some(set) = self.hdSetSchedulerRate else { return false };
+        // SAFETY: a plain value.
+        unsafe { set(c_ulong::from(hz)) };
+        self.first_error().is_none()
     }
 
     pub fn calibration(&self) -> Calibration {

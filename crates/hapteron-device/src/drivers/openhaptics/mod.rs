@@ -24,6 +24,8 @@ use std::time::{Duration, Instant};
 /// The name of this driver in scenes.
 pub(super) const KIND: &str = "openhaptics";
 const OPTIONS: [&str; 5] = ["library", "name", "homing_timeout", "patience", "rate"];
+/// Of the library's scheduler, Hz, as long as it takes no other.
+const USUAL_RATE: f64 = 1000.0;
 const CURE: &str = "Install OpenHaptics and the device driver from 3D Systems (https://support.3dsystems.com, 'OpenHaptics' and 'Haptic Device \
      Driver'); on Linux libHD.so needs libPHANToMIO.so beside it. Or set HAPTERON_HD_LIBRARY (or the option library) to the file";
 const NO_DEVICE_CURE: &str = "Check power and cable, run the vendor's Touch_Setup or diagnostic, and give the device's name there as the \
@@ -80,13 +82,13 @@ pub(super) fn open(options: &DriverOptions) -> Result<Box<dyn Device>, OpenError
     let options = options.of(KIND, &OPTIONS)?;
     let homing_timeout = options.seconds("homing_timeout", 60.0, 0.0..=600.0)?;
     let patience = options.seconds("patience", 0.1, 0.005..=10.0)?;
-    let rate = options.number("rate", 1000.0, 100.0..=8000.0)?;
+    let rate = options.number("rate", USUAL_RATE, 100.0..=8000.0)?;
     let (_, functions) = load(&options)?;
     let name = options.text("name").map(str::to_owned);
     let device = init(&functions, name.as_deref())?;
     functions.make_current(device);
     functions.enable_force(false);
-    functions.set_rate(rate as u32);
+    let rate = if functions.set_rate(rate.round() as u32) { rate.round() } else { USUAL_RATE };
     let capabilities = capabilities(&functions, rate);
     let gate = Box::leak(Box::new(Gate::new(Target {
         functions,
@@ -115,7 +117,7 @@ pub(super) fn attached() -> Result<Found, OpenError> {
     let device = init(&functions, None)?;
     functions.make_current(device);
     let serial = functions.string(SERIAL_NUMBER).map(|s| format!(" (serial number {s})")).unwrap_or_default();
-    let capabilities = capabilities(&functions, 1000.0);
+    let capabilities = capabilities(&functions, USUAL_RATE);
     functions.disable_device(device);
     notes.push("other devices of this library are opened by the option name".into());
     Ok((vec![Attached { address: format!("the default device{serial}"), capabilities }], notes))

@@ -95,14 +95,20 @@ impl Gate {
         // SAFETY: the gate is never freed.
         let handle = unsafe { functions.schedule(callback, data) };
         super::scheduler::start(functions);
-        self.wait(patience);
+        let ended = self.wait(patience);
         self.close();
         super::scheduler::stop(functions);
         functions.unschedule(handle);
-        self.lock().take().unwrap_or(Outcome::Fault(DeviceFault::Late))
+        match self.lock().take() {
+            // A tick that came after all, and found the gate closed, is no end that the control wanted.
+            None => Outcome::Fault(DeviceFault::Late),
+            Some(Outcome::Finished) if !ended => Outcome::Fault(DeviceFault::Late),
+            Some(outcome) => outcome,
+        }
     }
 
-    fn wait(&self, patience: Duration) {
+    /// Answers whether the service has ended; else no tick came for `patience`.
+    fn wait(&self, patience: Duration) -> bool {
         let first = self.ticks.load(Ordering::Relaxed);
         let mut seen = (first, Instant::now());
         while !self.ended.load(Ordering::SeqCst) {
@@ -111,9 +117,10 @@ impl Gate {
             if ticks != seen.0 {
                 seen = (ticks, Instant::now());
             } else if seen.1.elapsed() > if ticks == first { patience.max(START) } else { patience } {
-                return;
+                return false;
             }
         }
+        true
     }
 
     /// Nobody is inside and nobody comes in any more.

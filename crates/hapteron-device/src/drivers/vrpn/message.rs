@@ -125,7 +125,8 @@ impl<'a> Message<'a> {
         let [x, y, z, i, j, k, w] = doubles(p, 8);
         let position = Vector3::new(x, y, z);
         let orientation = crate::drivers::motion::unit(w, i, j, k)?;
-        position.iter().all(|c| c.is_finite()).then_some((int(p, 0), position, orientation))
+        // It goes back as the origin of the force field, in single precision.
+        crate::drivers::motion::single_is_finite(&position).then_some((int(p, 0), position, orientation))
     }
 
     /// `vrpn_Tracker Velocity`: sensor, m/s, rad/s. The rotation is given as what it comes to in a time.
@@ -297,12 +298,24 @@ mod tests {
             while let Ok(Some(message)) = incoming.next_message() {
                 let _ = (message.name(), message.button(), message.error());
                 if let Some((_, p, q)) = message.pose() {
-                    prop_assert!(p.iter().chain(q.coords.iter()).all(|c| c.is_finite()));
+                    prop_assert!(p.iter().chain(q.coords.iter()).all(|c| (*c as f32).is_finite()));
                 }
                 if let Some((_, v, w)) = message.velocity() {
                     prop_assert!(v.iter().chain(w.iter()).all(|c| c.is_finite()));
                 }
             }
+        }
+    }
+
+    /// Guards against a position that is a number here and none on its way back to the server.
+    #[test]
+    fn a_position_beyond_single_precision_is_no_pose() {
+        for (x, known) in [(0.1, true), (1e38, true), (1e39, false), (f64::NAN, false)] {
+            let mut payload = [0; 64];
+            payload[8..16].copy_from_slice(&f64::to_be_bytes(x));
+            payload[56..64].copy_from_slice(&1f64.to_be_bytes());
+            let message = Message { time: 0, sender: 0, kind: 0, payload: &payload };
+            assert_eq!(message.pose().is_some(), known, "{x}");
         }
     }
 

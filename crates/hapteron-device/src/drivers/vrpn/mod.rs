@@ -6,7 +6,7 @@
 mod connection;
 pub mod message;
 
-use super::motion::{Axes, Velocities, command_is_finite, limited, sample_is_finite};
+use super::motion::{Axes, Velocities, command_is_finite, limited, sample_is_finite, single_is_finite};
 use super::{Attached, DriverOptions, Found, OpenError};
 use crate::{Applied, Capabilities, Device, DeviceCommand, DeviceFault, DeviceSample, Pacing};
 use connection::{Connection, Devices, Event, NoConnection};
@@ -324,7 +324,8 @@ impl Device for Vrpn {
         if let Some(fault) = self.fault {
             return Err(fault);
         }
-        if !command_is_finite(command) {
+        let (force, factor) = limited(&command.force, self.capabilities.peak_force);
+        if !(command_is_finite(command) && single_is_finite(&force)) {
             if self.enabled {
                 self.send(&Vector3::zeros())?;
             }
@@ -333,7 +334,6 @@ impl Device for Vrpn {
         if !self.enabled {
             return Ok(Applied::Disabled);
         }
-        let (force, factor) = limited(&command.force, self.capabilities.peak_force);
         self.send(&force)?;
         Ok(if factor < 1.0 { Applied::Scaled(factor) } else { Applied::Fully })
     }

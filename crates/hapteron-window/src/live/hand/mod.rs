@@ -155,6 +155,10 @@ impl Device for WindowHand {
         &self.capabilities
     }
 
+    fn is_simulated(&self) -> bool {
+        true
+    }
+
     fn home(&mut self) -> Result<(), DeviceFault> {
         Ok(())
     }

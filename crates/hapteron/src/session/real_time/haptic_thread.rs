@@ -183,8 +183,13 @@ impl Loop {
         }
     }
 
-    fn write(&mut self, device: &SharedDevice, command: &DeviceCommand) -> Result<(), End> {
+    /// Gives the device a command, unless the session is to end.
+    pub fn write(&mut self, device: &SharedDevice, command: &DeviceCommand) -> Result<(), End> {
         let Some(mut device) = device.claim() else { return Err(End::HapticFrozen) };
+        // Asked while nobody else can have the device: one that was stopped as this thread hung in its tick gets no late force.
+        if let Some(end) = self.shared.requested() {
+            return Err(end);
+        }
         match device.write(command) {
             Ok(Applied::Fully) => Ok(()),
             Ok(applied @ (Applied::Scaled(_) | Applied::Disabled)) => {

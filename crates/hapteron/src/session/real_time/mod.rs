@@ -22,6 +22,7 @@ mod spool;
 mod supervisor;
 pub mod system;
 mod telemetry;
+mod threads;
 
 pub use bare::{Bare, bare_loop};
 pub use contact_thread::PassHook;
@@ -42,13 +43,13 @@ use crate::scene::{Scene, handle_at};
 use contact_thread::ContactLoop;
 use exchange::{Found, Seen, exchange};
 use hapteron_device::guard::{Guard, GuardError};
-use hapteron_device::{Device, DeviceFault, DeviceSample};
+use hapteron_device::{Capabilities, Device, DeviceFault, DeviceSample, Pacing};
 use haptic_thread::Loop;
 use lookahead::Lookahead;
 use shared::{Shared, SharedDevice};
-use std::sync::{Arc, mpsc};
-use std::thread;
+use std::sync::Arc;
 use std::time::Duration;
+use threads::{Started, Wishes};
 
 /// SCHED_FIFO priority that the haptic thread asks for: above the interrupts' threads (50), below the kernel's own watch (99).
 pub const HAPTIC_PRIORITY: i32 = 80;
@@ -56,6 +57,8 @@ pub const HAPTIC_PRIORITY: i32 = 80;
 pub const RATES: std::ops::RangeInclusive<f64> = 500.0..=8000.0;
 /// Time steps are compared with the rates to this share.
 const ROUNDING: f64 = 1e-6;
+/// A device that calls the loop does so at the scene's rate to this share.
+const PACE: f64 = 0.02;
 
 /// How a session is run. The defaults ask for all that the system may grant.
 pub struct RealTimeOptions {
@@ -130,6 +133,26 @@ pub enum StartError {
     /// The device.
     #[error("{0}: {1}")]
     Device(String, DeviceFault),
+    /// A device that calls the loop at another rate than the scene's.
+    #[error(
+        "{device} calls the loop {rate:.0} times a second, and integrator.time_step is {time_step} s: the body's time would not be the hand's. \
+         Cure: integrator.time_step = {wanted}"
+    )]
+    Pace {
+        /// Its name.
+        device: String,
+        /// Its calls a second.
+        rate: f64,
+        /// The scene's, seconds.
+        time_step: f64,
+        /// What it should be, seconds.
+        wanted: f64,
+    },
+    /// The scene's guard lets through more than the device is made for, or there is none.
+    #[error(
+        "{0}: the scene's guard is not for this device; Scene::adopt makes it so, with the device's capabilities"
+    )]
+    Unguarded(String),
     /// The system has no more threads.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] std::io::Error),
@@ -139,7 +162,7 @@ pub enum StartError {
 pub struct RealTime;
 
 impl RealTime {
-    /// Homes the device, switches its motors on and starts the threads.
+    /// Homes the device, starts the threads and, last, switches its motors on.
     ///
     /// # Errors
     /// [`StartError`]; the device is stopped then.
@@ -152,7 +175,17 @@ impl RealTime {
         if !(*RATES.start() * (1.0 - ROUNDING)..=*RATES.end() * (1.0 + ROUNDING)).contains(&rate) {
             return Err(StartError::Rate(scene.time_step, rate));
         }
-        let name = device.capabilities().name.clone();
+        let capabilities = device.capabilities();
+        let name = capabilities.name.clone();
+        if capabilities.pacing == Pacing::Callback && (capabilities.rate / rate - 1.0).abs() > PACE {
+            let (rate, time_step) = (capabilities.rate, scene.time_step);
+            device.stop();
+            return Err(StartError::Pace { device: name, rate, time_step, wanted: 1.0 / rate });
+        }
+        if !device.is_simulated() && !is_guarded(&scene, device.capabilities()) {
+            device.stop();
+            return Err(StartError::Unguarded(name));
+        }
         let guard = match scene.guard.map(Guard::new).transpose() {
             Ok(guard) => guard,
             Err(error) => {
@@ -160,7 +193,7 @@ impl RealTime {
                 return Err(StartError::Guard(error));
             }
         };
-        match prepare(device.as_mut()) {
+        match device.home().and_then(|()| first_sample(device.as_mut())) {
             Ok(sample) => launch(scene, device, guard, sample, options),
             Err(fault) => {
                 device.stop();
@@ -170,11 +203,27 @@ impl RealTime {
     }
 }
 
-fn prepare(device: &mut dyn Device) -> Result<DeviceSample, DeviceFault> {
-    device.home()?;
-    let sample = device.read()?;
-    device.set_force_enabled(true)?;
-    Ok(sample)
+/// Where the handle is, motors off. A device that calls the loop tells it in a round of its own.
+fn first_sample(device: &mut dyn Device) -> Result<DeviceSample, DeviceFault> {
+    let mut first = None;
+    match device.capabilities().pacing {
+        Pacing::Polled | Pacing::Exchange => first = Some(device.read()?),
+        Pacing::Callback => device.serve(&mut |sample| {
+            first = Some(*sample);
+            None
+        })?,
+    }
+    first.ok_or(DeviceFault::Late)
+}
+
+/// Whether nothing beyond a device's greatest force and torque can get through the scene's guard.
+fn is_guarded(scene: &Scene, device: &Capabilities) -> bool {
+    let within = |limit: f64, drives: bool, peak: f64| !drives || limit <= peak;
+    let drives = device.drives_force || device.drives_torque;
+    scene.guard.map_or(!drives, |guard| {
+        within(guard.max_force, device.drives_force, device.peak_force)
+            && within(guard.max_torque, device.drives_torque, device.peak_torque)
+    })
 }
 
 fn launch(
@@ -245,101 +294,8 @@ fn launch(
         lock_memory: options.lock_memory,
         watchdog: options.watchdog,
     };
-    threads(&wishes, haptic_loop, contact_loop, &shared, &device)
+    threads::start(&wishes, haptic_loop, contact_loop, &shared, &device)
         .map(|started| Running::new(scene, shared, device, outer, started))
-}
-
-/// What is asked of the system.
-struct Wishes {
-    priority: Option<i32>,
-    cpu: Option<usize>,
-    contact_priority: Option<i32>,
-    contact_cpu: Option<usize>,
-    lock_memory: bool,
-    watchdog: Duration,
-}
-
-/// The threads, and what they were granted.
-struct Started {
-    haptic: thread::JoinHandle<End>,
-    contact: thread::JoinHandle<Option<String>>,
-    supervisor: thread::JoinHandle<bool>,
-    grants: Grants,
-    awake: system::WakeLatency,
-    memory_locked: bool,
-}
-
-/// Starts the threads; the haptic one last, when all memory is there to be locked.
-fn threads(
-    wishes: &Wishes,
-    mut haptic_loop: Loop,
-    contact_loop: ContactLoop,
-    shared: &Arc<Shared>,
-    device: &Arc<SharedDevice>,
-) -> Result<Started, StartError> {
-    let mut grants = Grants::default();
-    let (awake, latency) = system::keep_awake();
-    grants.latency = latency;
-    let (tell, told) = mpsc::channel();
-    let (go, wait) = mpsc::channel::<()>();
-    let ask = |priority: Option<i32>, cpu: Option<usize>| {
-        system::wake_exactly();
-        (priority.map_or(Grant::NotAsked, system::raise_priority), cpu.map_or(Grant::NotAsked, system::pin))
-    };
-    let asked = (wishes.contact_priority, wishes.contact_cpu);
-    let contact_tell = tell.clone();
-    let contact = thread::Builder::new().name("contacts".into()).spawn(move || {
-        let _ = contact_tell.send((false, ask(asked.0, asked.1)));
-        contact_loop.run()
-    })?;
-    let asked = (wishes.priority, wishes.cpu);
-    let (haptic_shared, haptic_device) = (Arc::clone(shared), Arc::clone(device));
-    let spawned = thread::Builder::new().name("haptic".into()).spawn(move || {
-        let _ = tell.send((true, ask(asked.0, asked.1)));
-        system::touch_stack();
-        let _ = wait.recv();
-        haptic_loop.epoch_ns = clock::quiet_epoch(haptic_loop.period_ns);
-        haptic_loop.last_fresh_ns = haptic_loop.epoch_ns;
-        haptic_shared.pulse_ns.store(clock::now_ns(), std::sync::atomic::Ordering::Release);
-        haptic_loop.run(&haptic_device)
-    });
-    let haptic = match spawned {
-        Ok(haptic) => haptic,
-        Err(error) => {
-            shared.stop();
-            return Err(error.into());
-        }
-    };
-    for (is_haptic, (priority, cpu)) in told.iter().take(2) {
-        if is_haptic {
-            (grants.priority, grants.cpu) = (priority, cpu);
-        } else {
-            (grants.contact_priority, grants.contact_cpu) = (priority, cpu);
-        }
-    }
-    if wishes.lock_memory {
-        grants.memory = system::lock_memory();
-    }
-    let memory_locked = grants.memory.is_given();
-    shared.pulse_ns.store(clock::now_ns(), std::sync::atomic::Ordering::Release);
-    let (watched, kept, watchdog) = (Arc::clone(shared), Arc::clone(device), wishes.watchdog);
-    // Above the contact thread and below the haptic one.
-    let priority = wishes.priority.map(|p| (p - 1).max(1));
-    let supervisor = thread::Builder::new().name("supervisor".into()).spawn(move || {
-        let _ = ask(priority, None);
-        supervisor::watch(&watched, &kept, watchdog)
-    });
-    let supervisor = match supervisor {
-        Ok(supervisor) => supervisor,
-        Err(error) => {
-            // Without its supervisor it does not start.
-            shared.stop();
-            drop(go);
-            return Err(error.into());
-        }
-    };
-    let _ = go.send(());
-    Ok(Started { haptic, contact, supervisor, grants, awake, memory_locked })
 }
 
 /// The pass at the start, whose contacts the first tick uses: no one grips an object before its contacts are known.

@@ -82,6 +82,10 @@ impl Device for SceneDevice {
         &self.capabilities
     }
 
+    fn is_simulated(&self) -> bool {
+        true
+    }
+
     fn home(&mut self) -> Result<(), DeviceFault> {
         Ok(())
     }

@@ -151,6 +151,15 @@ mod linux {
         unsafe { libc::munlockall() };
     }
 
+    /// From now on Ctrl-Z at the terminal, and reading or writing there from the background, do not stop the process: its device would be left with
+    /// the last force.
+    pub fn ignore_suspend() {
+        for signal in [libc::SIGTSTP, libc::SIGTTIN, libc::SIGTTOU] {
+            // SAFETY: no handler is installed; signals that are ignored run no code.
+            unsafe { libc::signal(signal, libc::SIG_IGN) };
+        }
+    }
+
     fn has_capability(bit: u32) -> bool {
         let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
         let line = status.lines().find_map(|l| l.strip_prefix("CapEff:"));
@@ -218,6 +227,8 @@ mod elsewhere {
     }
 
     pub fn unlock_memory() {}
+
+    pub fn ignore_suspend() {}
 
     #[must_use]
     pub fn resident_bytes() -> Option<u64> {

@@ -6,6 +6,7 @@ use crate::scenes::spoon_in_cup;
 use crate::session::{Command, Gains};
 use hapteron_device::DeviceCommand;
 use hapteron_device::guard::{GuardSettings, GuardStatus};
+use std::thread;
 
 /// The haptic loop with both other ends of its exchange, and no thread.
 fn parts(scene: &Arc<Scene>) -> (Loop, exchange::ContactsEnd, exchange::OuterEnd) {
@@ -127,6 +128,18 @@ fn rounds_allocate_nothing(guard: Option<Guard>) {
     assert!(recorded >= 1_000_000 && free > 1000, "{recorded} records, {free} without force");
     assert!(pushing > 100_000, "{pushing} ticks pushed the hand");
     assert!(guard.is_none() || ramping > 1000 && ramping < 500_000, "{ramping} ticks on the guard's ramp");
+}
+
+/// Would catch a force that reaches a device after the supervisor has stopped it, from a tick that hung between reading and writing.
+#[test]
+fn nothing_is_written_once_the_session_is_to_end() {
+    let scene = Arc::new(Scene::from_file(spoon_in_cup(0.01, 2e3, Method::BackwardEuler)).unwrap());
+    let (mut haptic_loop, _contacts, _outer) = parts(&scene);
+    let device = SharedDevice::new(Box::new(SceneDevice::new(Arc::clone(&scene), false).unwrap()));
+    let command = DeviceCommand { force: nalgebra::Vector3::x(), ..DeviceCommand::zero() };
+    assert_eq!(haptic_loop.write(&device, &command), Ok(()));
+    haptic_loop.shared.frozen();
+    assert_eq!(haptic_loop.write(&device, &command), Err(End::HapticFrozen));
 }
 
 /// Would catch records that block the loop, or go astray without being counted, when nobody drains them.
