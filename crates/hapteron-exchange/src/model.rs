@@ -1,4 +1,4 @@
-//! Every meeting of the two sides, by loom: `RUSTFLAGS="--cfg loom" CARGO_TARGET_DIR=target/loom cargo test --release -p hapteron-exchange`.
+//! Every meeting of the two sides, by loom: `RUSTFLAGS="--cfg loom" CARGO_TARGET_DIR=target/loom cargo test -p hapteron-exchange --lib`.
 
 use crate::{newest, ring};
 use loom::thread;

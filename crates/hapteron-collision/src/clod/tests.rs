@@ -41,38 +41,51 @@ fn bumpy_sphere(rings: u32, bump: f64) -> Surface {
     Surface::of_triangles(&vertices, &triangles)
 }
 
-/// Built-in meshes, a bumpy sphere, and real ones where their data are.
-fn meshes() -> Vec<(String, Surface)> {
-    let mut list = vec![("bumpy sphere".to_owned(), bumpy_sphere(40, 0.03))];
-    for name in ["spoon", "cup", "lower_jaw"] {
-        let mesh = hapteron::assets::builtin(name).unwrap();
-        list.push((name.to_owned(), Surface::of_triangles(mesh.vertices(), mesh.triangles())));
-    }
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/queries");
-    for file in ["nut_bolt/body.obj", "tooth_rows/body.obj", "spoon_mug/obstacle.obj"] {
-        match crate::mesh::load(folder.join(file)) {
-            Ok(mesh) => list.push((file.to_owned(), Surface::build(&mesh))),
-            Err(_) => println!("skipped: {file} is not there"),
-        }
-    }
-    list
-}
-
 /// Would catch a patch that is not convex, a deviation that is guessed, a margin too small, a hole in a level, samples that
 /// do not stand for every vertex.
+fn invariants_hold(name: &str, surface: &Surface) {
+    let hierarchy = build(surface);
+    assert!(hierarchy.levels >= 3, "{name}: only {} levels", hierarchy.levels);
+    patches_are_convex(name, surface, &hierarchy);
+    levels_cover(name, surface, &hierarchy);
+    deviations_hold(name, surface, &hierarchy);
+    margins_hold(name, surface, &hierarchy);
+    samples_are_nested(name, &hierarchy);
+    let bytes = hierarchy.memory_bytes() / surface.triangles.len();
+    assert!(bytes < 1000, "{name}: {bytes} bytes a triangle");
+}
+
 #[test]
-fn invariants() {
-    for (name, surface) in meshes() {
-        let hierarchy = build(&surface);
-        assert!(hierarchy.levels >= 3, "{name}: only {} levels", hierarchy.levels);
-        patches_are_convex(&name, &surface, &hierarchy);
-        levels_cover(&name, &surface, &hierarchy);
-        deviations_hold(&name, &surface, &hierarchy);
-        margins_hold(&name, &surface, &hierarchy);
-        samples_are_nested(&name, &hierarchy);
-        let bytes = hierarchy.memory_bytes() / surface.triangles.len();
-        assert!(bytes < 1000, "{name}: {bytes} bytes a triangle");
+fn invariants_of_made_meshes() {
+    invariants_hold("bumpy sphere", &bumpy_sphere(40, 0.03));
+    for name in ["spoon", "cup", "lower_jaw"] {
+        let mesh = hapteron::assets::builtin(name).unwrap();
+        invariants_hold(name, &Surface::of_triangles(mesh.vertices(), mesh.triangles()));
     }
+}
+
+/// Where their data are; one test each, for they take long.
+fn real_invariants_hold(file: &str) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/queries");
+    match crate::mesh::load(folder.join(file)) {
+        Ok(mesh) => invariants_hold(file, &Surface::build(&mesh)),
+        Err(_) => println!("skipped: {file} is not there"),
+    }
+}
+
+#[test]
+fn invariants_of_a_bolt_s_nut() {
+    real_invariants_hold("nut_bolt/body.obj");
+}
+
+#[test]
+fn invariants_of_teeth() {
+    real_invariants_hold("tooth_rows/body.obj");
+}
+
+#[test]
+fn invariants_of_a_mug() {
+    real_invariants_hold("spoon_mug/obstacle.obj");
 }
 
 fn patches_are_convex(name: &str, surface: &Surface, h: &Hierarchy) {

@@ -3,15 +3,19 @@
 
 use super::*;
 
+/// Points along an edge of the sheet: few, for some tests read it again for each byte of its cache.
+const SIDE: u32 = 8;
+
 fn surface(height: f64) -> Surface {
     let mut vertices = Vec::new();
     let mut triangles = Vec::new();
-    for i in 0..12u32 {
-        for j in 0..12u32 {
-            let (x, y) = (f64::from(i) * 0.1, f64::from(j) * 0.1);
+    for i in 0..SIDE {
+        for j in 0..SIDE {
+            let (x, y) = (f64::from(i) * 0.15, f64::from(j) * 0.15);
             vertices.push([x, y, height * (5.0 * x).sin() * (4.0 * y).cos()]);
             if i > 0 && j > 0 {
-                let [a, b, c, d] = [(i - 1) * 12 + j - 1, i * 12 + j - 1, i * 12 + j, (i - 1) * 12 + j];
+                let [a, b, c, d] =
+                    [(i - 1) * SIDE + j - 1, i * SIDE + j - 1, i * SIDE + j, (i - 1) * SIDE + j];
                 triangles.extend([[a, b, c], [a, c, d]]);
             }
         }
@@ -20,7 +24,9 @@ fn surface(height: f64) -> Surface {
 }
 
 fn build(surface: &Surface) -> Hierarchy {
-    Hierarchy::build(surface, &mut |_| true).unwrap()
+    let built = Hierarchy::build(surface, &mut |_| true).unwrap();
+    assert!(built.levels >= 3, "only {} levels", built.levels);
+    built
 }
 
 /// Would catch a damaged file that is used: every byte is flipped in turn, and the file is cut short everywhere.
