@@ -148,6 +148,13 @@ fn point_leaf(p: Vec3, surface: &Surface, leaf: &Leaf) -> (f64, usize) {
 /// Squared distance of the point `ap` to the triangle 0, `ab`, `ac`.
 #[inline(always)]
 fn point_triangle(ab: Vec3, ac: Vec3, ap: Vec3) -> f64 {
+    let e = from_triangle(ab, ac, ap);
+    dot(e, e)
+}
+
+/// The way to the point `ap` from the closest point of the triangle 0, `ab`, `ac`.
+#[inline(always)]
+pub(crate) fn from_triangle(ab: Vec3, ac: Vec3, ap: Vec3) -> Vec3 {
     let (d1, d2) = (dot(ab, ap), dot(ac, ap));
     let (aa, bc, cc) = (dot(ab, ab), dot(ab, ac), dot(ac, ac));
     let (d3, d4, d5, d6) = (d1 - aa, d2 - bc, d1 - bc, d2 - cc);
@@ -170,8 +177,7 @@ fn point_triangle(ab: Vec3, ac: Vec3, ap: Vec3) -> f64 {
     let (v, w, whole) = if whole > 0.0 { (v, w, whole) } else { (0.0, 0.0, 1.0) };
     let inverse = 1.0 / whole;
     let (v, w) = (v * inverse, w * inverse);
-    let e = [ap[0] - v * ab[0] - w * ac[0], ap[1] - v * ab[1] - w * ac[1], ap[2] - v * ab[2] - w * ac[2]];
-    dot(e, e)
+    [ap[0] - v * ab[0] - w * ac[0], ap[1] - v * ab[1] - w * ac[1], ap[2] - v * ab[2] - w * ac[2]]
 }
 
 /// Distance of a point to a triangle.

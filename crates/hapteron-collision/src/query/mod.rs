@@ -32,6 +32,8 @@ use walk::Walk;
 /// find them without a walk; and the number of steps like the last one that this should last for.
 const AHEAD: f64 = 0.5;
 const STEPS_AHEAD: f64 = 8.0;
+/// For a workspace that was told how far to look ahead.
+const MORE_STEPS_AHEAD: f64 = 32.0;
 
 /// The two surfaces and where they are.
 #[derive(Clone, Copy)]
@@ -64,6 +66,8 @@ impl Pair<'_> {
 pub struct QueryWorkspace {
     walk: Walk,
     collected: Option<Collected>,
+    /// How far near leaves are collected beyond the tolerance, metres, if not as far as that suggests.
+    ahead: Option<f64>,
     ridges: ridges::Ridges,
     deep: deep::Memory,
     body: side::Side,
@@ -90,6 +94,11 @@ impl QueryWorkspace {
         Self::default()
     }
 
+    /// From now on near leaves are collected less often, as far away as `ahead` beyond the tolerance: the better way where that is short and little is found.
+    pub(crate) fn look_ahead(&mut self, ahead: f64) {
+        self.ahead = Some(ahead);
+    }
+
     /// Makes sure that the lists of near leaves hold all that can be within the tolerance. Gives what the body has travelled.
     #[inline(always)]
     fn collect(&mut self, simd: impl Simd, pair: Pair<'_>) -> f64 {
@@ -113,11 +122,9 @@ impl QueryWorkspace {
             self.ridges.reset(pair);
         }
         // Looking far ahead pays for a slow motion only, and not at all for a first query or a jump.
-        let ahead = if known.is_some() && step < AHEAD * pair.tolerance {
-            (STEPS_AHEAD * step).min(AHEAD * pair.tolerance)
-        } else {
-            0.0
-        };
+        let (steps, most) =
+            self.ahead.map_or((STEPS_AHEAD, AHEAD * pair.tolerance), |most| (MORE_STEPS_AHEAD, most));
+        let ahead = if known.is_some() && step < most { (steps * step).min(most) } else { 0.0 };
         let reach = pair.tolerance + ahead;
         walk::walk(simd, pair, ahead, &mut self.walk);
         let [body_apart, obstacle_apart] = self.deep.apart.each_mut();

@@ -4,14 +4,16 @@
 //! changes by more than the surfaces have moved, that bounds its distance now, so most nodes are passed or refused without
 //! a search. And for every node how far it is replaced by its children, so that levels change smoothly.
 
-use super::known::Memory;
+use super::emit::Emit;
+use super::memory::Memory;
 use super::metric::Judge;
+use super::plan::{Plan, Planned};
 use super::side::Search;
 use crate::clod::middle::Middle;
 use crate::clod::nearest::{Nearest, slack};
 use crate::clod::{Hierarchy, Node, PURE_HULL, range};
-use crate::query::feature::{self, Feature, Foot};
-use crate::surface::{Surface, VertexNormal};
+use crate::query::feature::Foot;
+use crate::surface::Surface;
 use crate::vector::{Rigid, Vec3, dot, norm, sub};
 
 /// A change of level takes this many queries.
@@ -19,24 +21,15 @@ pub(super) const BLEND_STEPS: f32 = 20.0;
 /// What is nearer than this many tolerances belongs to the front.
 pub(super) const REACH: f64 = 1.25;
 
+/// The triangles that are held for a sample are those that are this many tolerances farther than the closest, as far as there is room.
+const AROUND: f64 = 0.3;
+
 /// Searches note what is this many tolerances farther than they need to: more or less by vertex, so that what many vertices know does not
 /// run out in the same query.
 fn band(vertex: u32) -> f64 {
     // By the golden ratio neighbours are far apart, and all are spread evenly.
     let spread = vertex.wrapping_mul(0x9e37_79b9);
     0.25 + 0.5 * f64::from(spread) / f64::from(u32::MAX)
-}
-
-/// A sample within the tolerance.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Found {
-    pub vertex: u32,
-    pub weight: f32,
-    /// Where the vertex is, in the other surface's frame.
-    pub point: Vec3,
-    pub foot: Foot,
-    /// Of the vertex, in its own surface's frame.
-    pub normal: VertexNormal,
 }
 
 /// What a walk came past.
@@ -48,64 +41,6 @@ pub(super) struct Tally {
     pub near: f64,
     /// Vertices in contact, each as much as its force: those where force begins count for nothing.
     pub contact: f64,
-}
-
-/// A sample that is looked at.
-#[derive(Clone, Copy, Debug)]
-struct Planned {
-    vertex: u32,
-    weight: f32,
-    /// Where the memory of the vertex is.
-    place: usize,
-    /// Where the vertex is and its normal, own frame.
-    own: Vec3,
-    normal: VertexNormal,
-}
-
-/// The triangle that the foot of a sample was on, kept beside the sample: what is scattered over the memory takes longer to come than to use.
-#[derive(Clone, Copy, Debug)]
-struct Held {
-    triangle: u32,
-    corners: [Vec3; 3],
-    /// Lower bound of the distances of all other triangles, plus what the surfaces had moved by then in all.
-    until: f64,
-}
-
-impl Held {
-    const NOTHING: Self = Self { triangle: 0, corners: [[0.0; 3]; 3], until: f64::NEG_INFINITY };
-}
-
-/// The samples of a front whose levels are settled. They stay the ones to look at until the surfaces have moved as far as the
-/// reach goes beyond the tolerance, or other levels are wanted.
-#[derive(Clone, Debug, Default)]
-struct Plan {
-    samples: Vec<Planned>,
-    /// By sample a lower bound of its distance when it was last looked at, plus what the surfaces had moved by then in all.
-    clear: Vec<f64>,
-    /// By sample.
-    held: Vec<Held>,
-    /// What could be within the tolerance when the surfaces have moved this far in all, less the tolerance, is not planned for.
-    until: f64,
-    /// Which levels it was made for.
-    level: f64,
-    /// What the walk came past.
-    tally: Tally,
-}
-
-impl Plan {
-    fn begin(&mut self, judge: &Judge, search: &Search<'_>) {
-        self.samples.clear();
-        self.clear.clear();
-        self.held.clear();
-        self.level = judge.weight * judge.leniency;
-        self.until = search.travelled + REACH * search.tolerance;
-    }
-
-    fn serves(&self, judge: &Judge, search: &Search<'_>) -> bool {
-        judge.depends_on_weight_alone()
-            && self.level == judge.weight * judge.leniency
-            && search.travelled + search.tolerance < self.until
-    }
 }
 
 /// The front of one surface.
@@ -123,7 +58,6 @@ pub(super) struct Front {
     searches: usize,
     allowed: usize,
     plan: Plan,
-    pub found: Vec<Found>,
     /// Somebody looks at the front: its nodes are noted as well.
     pub watched: bool,
     pub nodes: Vec<u32>,
@@ -139,10 +73,15 @@ impl Front {
             seen: vec![0; count],
             walk: 1,
             watched: self.watched,
-            plan: Plan { until: f64::NEG_INFINITY, ..Plan::default() },
+            plan: Plan::none(),
             allowed: usize::MAX,
             ..Self::default()
         };
+    }
+
+    /// How far the finest of its nodes is off; zero where there are only faces without a vertex near.
+    pub(super) fn deviation(&self) -> f64 {
+        if self.plan.deviation.is_finite() { self.plan.deviation } else { 0.0 }
     }
 
     /// The next walk chooses levels at once, without a change that takes time.
@@ -197,7 +136,20 @@ impl Front {
         if known.exact && known.distance + moved <= limit {
             return true;
         }
-        self.look(middle.vertex, place, search, limit).is_some()
+        let p = search.motion.point(search.own.vertices[middle.vertex as usize]);
+        known.is_within(p, search.other, limit) || self.look(middle.vertex, place, search, limit).is_some()
+    }
+
+    /// A lower bound of the distance of a sample of a node with this middle, plus what the surfaces have moved in all.
+    #[inline(always)]
+    fn clear(&mut self, place: usize, vertex: u32, middle: Middle, own: &Surface) -> f64 {
+        let clear = self.memory.clear[place];
+        if clear > f64::NEG_INFINITY {
+            return clear;
+        }
+        let at = self.memory.place(middle.vertex);
+        let apart = norm(sub(own.vertices[vertex as usize], own.vertices[middle.vertex as usize]));
+        self.memory.clear[at] - apart
     }
 
     /// The place of a sample and its foot, when that is within the tolerance; otherwise `clear` tells from when on it could be.
@@ -205,29 +157,25 @@ impl Front {
     fn look_again(
         &mut self,
         sample: &Planned,
-        held: &mut Held,
+        held_at: &mut u32,
         clear: &mut f64,
         search: &Search<'_>,
     ) -> Option<(Vec3, Foot)> {
-        let others = held.until - search.travelled;
-        if others > 0.0 {
+        if let Some(held) = self.memory.held(*held_at) {
             let p = search.motion.point(sample.own);
-            let foot = feature::foot_between(p, held.corners, held.triangle, search.other);
-            let distance = foot.signed_distance.abs();
-            if distance < others {
+            if let Some(foot) = held.foot(p, search.other) {
+                let distance = foot.signed_distance.abs();
                 *clear = distance + search.travelled;
+                self.memory.clear[sample.place] = *clear;
                 return (distance <= search.tolerance).then_some((p, foot));
             }
         }
         let found = self.look(sample.vertex, sample.place, search, search.tolerance);
-        let known = self.memory.at(sample.place);
-        *clear = known.distance + search.travelled;
-        // Beside an edge or a vertex another triangle is as close.
-        let face = found.filter(|(_, foot)| matches!(foot.feature, Feature::Face(_)));
-        *held = face.and_then(|_| known.held()).map_or(Held::NOTHING, |(triangle, until)| {
-            let corners = feature::corners(triangle, search.other);
-            Held { triangle, corners, until }
-        });
+        *clear = self.memory.clear[sample.place];
+        if let Some((p, foot)) = found {
+            let reach = foot.signed_distance.abs() + AROUND * search.tolerance;
+            *held_at = self.memory.hold(sample.place, p, search, reach);
+        }
         found
     }
 
@@ -237,14 +185,14 @@ impl Front {
         let p = search.motion.point(search.own.vertices[vertex as usize]);
         let slack = slack(search.other.radius + search.tolerance);
         let known = self.memory.at(place);
-        let before = known.searched;
-        let foot = known.look(p, search, limit, band(vertex) * search.tolerance, slack, &mut self.nearest);
-        self.searches += usize::from(known.searched != before);
+        let band = band(vertex) * search.tolerance;
+        let foot = known.look(p, search, limit, band, slack, &mut self.nearest, &mut self.searches);
+        self.memory.clear[place] = known.distance + search.travelled;
         foot.map(|foot| (p, foot))
     }
 }
 
-/// Makes `found` the samples of the front that are within the tolerance, with no more searches through the tree than about so many; none
+/// Finds the samples of the front that are within the tolerance, with no more searches through the tree than about so many; none
 /// when these are not enough. What was found out by then is remembered.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
 pub(super) fn find(
@@ -253,8 +201,8 @@ pub(super) fn find(
     search: &Search<'_>,
     judge: &Judge,
     allowed: usize,
+    emit: &mut Emit<'_>,
 ) -> Option<Tally> {
-    front.found.clear();
     (front.searches, front.allowed) = (0, allowed);
     if !front.watched {
         front.nodes.clear();
@@ -266,25 +214,19 @@ pub(super) fn find(
     let mut tally = plan.tally;
     let force_from =
         judge.detail.force_from.unwrap_or(search.tolerance).min(search.tolerance).max(f64::MIN_POSITIVE);
-    for ((sample, clear), held) in plan.samples.iter().zip(&mut plan.clear).zip(&mut plan.held) {
+    for ((sample, clear), held_at) in plan.samples.iter().zip(&mut plan.clear).zip(&mut plan.held_at) {
         if *clear > search.travelled + search.tolerance {
             continue;
         }
-        let Some((point, foot)) = front.look_again(sample, held, clear, search) else {
+        if front.searches >= front.allowed {
+            break;
+        }
+        let Some((point, foot)) = front.look_again(sample, held_at, clear, search) else {
             continue;
         };
         let pressed = 1.0 - foot.signed_distance / force_from;
         tally.contact += f64::from(sample.weight) * pressed.clamp(0.0, 1.0);
-        front.found.push(Found {
-            vertex: sample.vertex,
-            weight: sample.weight,
-            point,
-            foot,
-            normal: sample.normal,
-        });
-        if front.searches >= front.allowed {
-            break;
-        }
+        emit.sample(sample, point, &foot);
     }
     front.plan = plan;
     (front.searches < front.allowed).then_some(tally)
@@ -305,7 +247,8 @@ fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &J
             front.plan.until = f64::NEG_INFINITY;
             return None;
         }
-        if !front.is_near(hierarchy.middles[index as usize], search) {
+        let middle = hierarchy.middles[index as usize];
+        if !front.is_near(middle, search) {
             continue;
         }
         let node = &hierarchy.nodes[index as usize];
@@ -323,23 +266,23 @@ fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &J
             // The next query takes another step.
             front.plan.until = f64::NEG_INFINITY;
         }
+        front.plan.deviation = front.plan.deviation.min(node.deviation);
         for sample in &hierarchy.samples[range(node.samples)] {
             let weight = sample.weight * share * (1.0 - open);
             tally.samples += 1;
             tally.near += f64::from(weight);
             let place = front.memory.place(sample.vertex);
-            let known = front.memory.at(place);
-            let lower = known.distance + known.at;
+            let lower = front.clear(place, sample.vertex, middle, search.own);
             if lower - search.travelled <= reach {
-                let own = search.own.vertices[sample.vertex as usize];
-                let normal = search.own.vertex_normals[sample.vertex as usize];
-                front.plan.samples.push(Planned { vertex: sample.vertex, weight, place, own, normal });
-                front.plan.clear.push(lower);
-                front.plan.held.push(Held::NOTHING);
+                front.plan.push(sample.vertex, weight, place, lower, search.own);
+                front.plan.held_at.push(front.memory.held_at(place));
             }
         }
     }
     front.plan.tally = tally;
+    if front.plan.until > f64::NEG_INFINITY {
+        front.memory.arrange(&front.plan.samples, &mut front.plan.held_at);
+    }
     Some(())
 }
 
@@ -359,5 +302,6 @@ pub(super) fn displacement(root: &Node, from: &Rigid, to: &Rigid) -> f64 {
         })
         .sum();
     let shift = sub(to.point(root.center), from.point(root.center));
-    norm(shift) + root.radius * turn.sqrt()
+    // A turn about any axis has two unit vectors that it moves, at right angles, by the same amount.
+    norm(shift) + root.radius * (0.5 * turn).sqrt()
 }

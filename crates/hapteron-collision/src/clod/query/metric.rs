@@ -178,6 +178,15 @@ const NEAR_SAMPLES: f64 = 24.0;
 /// Samples wanted in contact on each surface, times the threshold as a share of the radius.
 const SAMPLES: f64 = 1.6;
 
+/// Fewest samples in contact that are asked for, on each surface.
+const FEWEST: f64 = 8.0;
+
 fn wanted_samples(detail: &Detail, radius: f64) -> f64 {
-    (SAMPLES * radius / detail.threshold).max(8.0)
+    (SAMPLES * radius / detail.threshold).max(FEWEST)
+}
+
+/// Samples in contact on both surfaces, at least: other metrics than the threshold may be content with few.
+pub(super) fn least_samples(detail: &Detail, radius: f64) -> f64 {
+    let threshold_alone = detail.per_step == 0.0 && detail.view.is_none();
+    2.0 * if threshold_alone { wanted_samples(detail, radius) } else { FEWEST }
 }

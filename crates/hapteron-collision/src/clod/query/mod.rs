@@ -6,10 +6,14 @@
 //! between samples, and a contact carries the number of vertices that it stands for, so that the total stiffness does not
 //! depend on the level.
 
+mod emit;
 mod front;
+mod held;
 mod known;
 mod least;
+mod memory;
 mod metric;
+mod plan;
 mod side;
 mod small;
 
@@ -17,14 +21,14 @@ pub use metric::{Combine, Detail, View};
 
 use super::{Hierarchy, range};
 use crate::contact::Contact;
-use crate::query::feature::{Feature, Foot};
 use crate::query::{QueryResult, QueryWorkspace, query};
-use crate::surface::{Surface, VertexNormal};
-use crate::vector::{Rigid, Vec3, dot, scale};
-use front::{Found, Front, Tally, find};
+use crate::surface::Surface;
+use crate::vector::{Rigid, Vec3, scale};
+use emit::Emit;
+use front::{Front, Tally, find};
 use least::Least;
-use metric::{Density, Judge};
-use nalgebra::{Isometry3, Vector3};
+use metric::{Density, Judge, least_samples};
+use nalgebra::Isometry3;
 use side::Search;
 use small::{Pace, Seen, Warmth, Way};
 
@@ -33,6 +37,13 @@ const LENIENT: f64 = 1.2;
 const MOST_LENIENT: f64 = 1e6;
 /// One that takes less than this share of it makes them stricter again.
 const SPARE: f64 = 0.6;
+
+/// In contacts of more vertices than this nothing is looked for that is closer than the samples show: it would take several milliseconds every now and then.
+const LARGEST: f64 = 10_000.0;
+/// What could come closer than the samples show is collected as far away as this share of the tolerance.
+const AHEAD: f64 = 0.1;
+/// Where the levels leave nothing that could be closer, at least what crosses is looked for, and what is closer than this share of the tolerance.
+const CROSSING: f64 = 0.01;
 
 /// A surface with its hierarchy.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +69,8 @@ impl Lod<'_> {
 #[derive(Clone, Debug, Default)]
 pub struct LodWorkspace {
     exact: QueryWorkspace,
+    /// For what is closer than the samples show.
+    closer: QueryWorkspace,
     state: Option<State>,
     /// Of the body and of the obstacle.
     fronts: [Front; 2],
@@ -124,6 +137,7 @@ impl LodWorkspace {
                 front.reset(lod.surface, lod.hierarchy);
             }
             self.least.reset();
+            self.closer.look_ahead(AHEAD * pair.tolerance);
             self.leniency = 1.0;
             self.way = Way::default();
             self.warmth = Warmth::Cold;
@@ -148,6 +162,8 @@ struct Pair<'a> {
 /// A pair with what its levels depend on.
 struct Scenery<'a> {
     pair: Pair<'a>,
+    /// From the obstacle's mesh frame to the world.
+    world: Rigid,
     /// From the body's mesh frame to the obstacle's in the last query.
     last: Rigid,
     detail: &'a Detail,
@@ -165,7 +181,8 @@ fn inverse(motion: &Rigid) -> Rigid {
 /// Finds where two surfaces are closer than `tolerance` (metres) or cross, in as much detail as `detail` asks for.
 ///
 /// With an exact `detail` it is [`query()`]. Otherwise contacts stand for `weight` vertices each; the points, normals
-/// and depths are exact where they are. The least distance is that of a local minimum of the exact distance. Hierarchies that do not belong
+/// and depths are exact where they are. The least distance is no farther from the exact one than both surfaces' nodes are off at the place where they are closest;
+/// in contacts of more than 10,000 vertices it is that of a local minimum. Hierarchies that do not belong
 /// to their surfaces, poses and tolerances that are not finite, find nothing. Not for the haptic thread.
 pub fn query_levels<'a>(
     body: Lod<'_>,
@@ -202,10 +219,10 @@ pub fn query_levels<'a>(
     let world = Rigid::from_isometry(world_from_obstacle);
     let known = workspace.prepare(&pair);
     let last = known.map_or(pair.motion, |s| s.motion);
-    let scenery = Scenery { pair, last, detail, eye };
+    let scenery = Scenery { pair, world, last, detail, eye };
     let min_distance = match workspace.way {
         Way::Exact(share) => workspace.find_exactly(&scenery, share),
-        Way::Levels => workspace.find_by_levels(&scenery, &world),
+        Way::Levels => workspace.find_by_levels(&scenery),
     };
     if let (Some(started), Some(budget)) = (started, detail.budget_us) {
         let share = started.elapsed().as_secs_f64() * 1e6 / budget;
@@ -220,24 +237,40 @@ pub fn query_levels<'a>(
 
 impl LodWorkspace {
     /// By levels.
-    fn find_by_levels(&mut self, scenery: &Scenery<'_>, world: &Rigid) -> f64 {
-        self.look(scenery, usize::MAX);
-        let pair = &scenery.pair;
+    fn find_by_levels(&mut self, scenery: &Scenery<'_>) -> f64 {
         self.contacts.clear();
-        self.least.begin();
-        self.push_body(pair, world);
-        self.push_obstacle(pair, world);
+        self.look(scenery, usize::MAX);
         let back = inverse(&scenery.last);
         let [of_body, of_obstacle] = self.searches(scenery, &back);
-        let min_distance = self.least.refine(&mut self.fronts, [&of_body, &of_obstacle]);
+        let least = self.least.refine(&mut self.fronts, [&of_body, &of_obstacle]);
         let vertices: f64 = self.contacts.iter().map(|c| c.weight).sum();
-        let pressed = -min_distance / pair.tolerance;
-        self.way = small::after_levels(vertices, pressed, self.leniency > 1.0, self.pace);
+        let min_distance = if vertices < LARGEST { self.assure(scenery, least) } else { least };
+        self.way = small::after_levels(vertices, self.seen(scenery, self.contacts.len(), min_distance));
         if self.way != Way::Levels {
             let Self { fronts, weights, .. } = self;
             fronts.iter().zip(weights).for_each(|(front, weights)| front.weights(weights));
         }
         min_distance
+    }
+
+    /// The least distance, which is known for the samples and what is around them: no farther from the exact one than the deviations of the nodes where that is.
+    fn assure(&mut self, scenery: &Scenery<'_>, least: f64) -> f64 {
+        let pair = &scenery.pair;
+        // What is closer by more than the finest nodes are off is looked for exactly.
+        let deviation = self.fronts[0].deviation() + self.fronts[1].deviation();
+        let closer = if least.is_finite() { least - deviation } else { pair.tolerance };
+        let tolerance = closer.max(CROSSING * pair.tolerance).min(pair.tolerance);
+        let [world_from_body, world_from_obstacle] = pair.poses;
+        let (a, b) = (pair.body.surface, pair.obstacle.surface);
+        let found = query(a, world_from_body, b, world_from_obstacle, tolerance, &mut self.closer);
+        least.min(found.min_distance)
+    }
+
+    fn seen(&self, scenery: &Scenery<'_>, contacts: usize, min_distance: f64) -> Seen {
+        let pair = &scenery.pair;
+        let wanted = least_samples(scenery.detail, pair.body.hierarchy.radius());
+        let pressed = -min_distance / pair.tolerance;
+        Seen { contacts, pressed, late: self.leniency > 1.0, pace: self.pace, wanted }
     }
 
     /// By the exact query, and on towards the levels when these would be better.
@@ -249,14 +282,13 @@ impl LodWorkspace {
         let found = query(a, world_from_body, b, world_from_obstacle, pair.tolerance, &mut self.exact);
         small::fade(found.contacts, surfaces, share, &self.weights, pair.tolerance, &mut self.contacts);
         let min_distance = found.min_distance;
-        let seen = Seen {
-            contacts: found.contacts.len(),
-            pressed: -min_distance / pair.tolerance,
-            late: self.leniency > 1.0,
-            pace: self.pace,
-        };
+        let contacts = found.contacts.len();
+        let seen = self.seen(scenery, contacts, min_distance);
         if seen.asks_for_levels() {
+            let count = self.contacts.len();
             self.way = self.approach_levels(scenery, share, seen.searches());
+            // Those of the fronts do not count yet.
+            self.contacts.truncate(count);
         } else {
             self.way = small::blended(share, false);
             if self.way == Way::Exact(1.0) && !matches!(self.warmth, Warmth::Resting(_)) {
@@ -306,75 +338,25 @@ impl LodWorkspace {
     /// Looks for the samples within the tolerance, with no more searches than about so many. True when that was enough and the levels
     /// are those that the contact asks for.
     fn look(&mut self, scenery: &Scenery<'_>, allowed: usize) -> bool {
-        let Scenery { pair, detail, eye, .. } = scenery;
+        let Scenery { pair, world, detail, eye, .. } = scenery;
         let back = inverse(&scenery.last);
         let radius = pair.body.hierarchy.radius();
         let searches = self.searches(scenery, &back);
         let mut settled = true;
+        self.least.begin();
         for (k, hierarchy) in [pair.body.hierarchy, pair.obstacle.hierarchy].into_iter().enumerate() {
             let weight = self.densities[k].weight(detail, radius);
             let judge = Judge { detail: **detail, weight, eye: eye[k], leniency: self.leniency };
-            let Some(tally) = find(&mut self.fronts[k], hierarchy, &searches[k], &judge, allowed) else {
-                return false;
-            };
+            let mut emit =
+                Emit { pair, world, side: k, contacts: &mut self.contacts, least: &mut self.least };
+            let found = find(&mut self.fronts[k], hierarchy, &searches[k], &judge, allowed, &mut emit);
+            let Some(tally) = found else { return false };
             self.tallies[k] = tally;
             self.densities[k].observe(&tally);
             settled &= self.densities[k].weight(detail, radius) == weight;
         }
         settled
     }
-
-    fn push_body(&mut self, pair: &Pair<'_>, world: &Rigid) {
-        let (a, b) = (pair.body.surface, pair.obstacle.surface);
-        for Found { vertex, weight, point, foot, normal: own } in &self.fronts[0].found {
-            self.least.offer(0, *vertex, foot.signed_distance);
-            let normal = scale(foot.normal, -1.0);
-            if faces(own, pair.motion.direction(own.normal.map(f64::from)), normal, foot.signed_distance) {
-                let features = [Feature::Vertex(*vertex).number(a), foot.feature.number(b)];
-                push(&mut self.contacts, world, [*point, foot.point], normal, foot, *weight, features);
-            }
-        }
-    }
-
-    fn push_obstacle(&mut self, pair: &Pair<'_>, world: &Rigid) {
-        let (a, b) = (pair.body.surface, pair.obstacle.surface);
-        for Found { vertex, weight, foot, normal: own, .. } in &self.fronts[1].found {
-            self.least.offer(1, *vertex, foot.signed_distance);
-            let normal = pair.motion.direction(foot.normal);
-            if faces(own, own.normal.map(f64::from), scale(normal, -1.0), foot.signed_distance) {
-                let features = [foot.feature.number(a), Feature::Vertex(*vertex).number(b)];
-                let points = [pair.motion.point(foot.point), b.vertices[*vertex as usize]];
-                push(&mut self.contacts, world, points, normal, foot, *weight, features);
-            }
-        }
-    }
-}
-
-/// Whether a surface with this vertex can touch along `direction` (outward); the rule of the exact query.
-fn faces(vertex: &VertexNormal, normal: Vec3, direction: Vec3, signed_distance: f64) -> bool {
-    let cone = f64::from(vertex.cone);
-    dot(normal, direction) >= if signed_distance <= 0.0 { cone.min(0.0) } else { cone }
-}
-
-/// `points` on body and obstacle and `normal` are in the obstacle's frame.
-fn push(
-    contacts: &mut Vec<Contact>,
-    world: &Rigid,
-    points: [Vec3; 2],
-    normal: Vec3,
-    foot: &Foot,
-    weight: f32,
-    [body_feature, obstacle_feature]: [u32; 2],
-) {
-    contacts.push(Contact {
-        point_body: Vector3::from(world.point(points[0])),
-        point_obstacle: Vector3::from(world.point(points[1])),
-        normal: Vector3::from(world.direction(normal)),
-        depth: -foot.signed_distance,
-        weight: f64::from(weight),
-        body_feature,
-        obstacle_feature,
-    });
 }
 
 #[cfg(test)]

@@ -12,8 +12,9 @@ use crate::surface::Surface;
 /// A contact of more vertices than this is large, of fewer than that share of it small again.
 const LARGE: f64 = 96.0;
 const SMALL_AGAIN: f64 = 0.5;
-/// Where surfaces move by this share of the tolerance from query to query a large contact has twice as many vertices, and so on.
-const SLOW: f64 = 0.0125;
+/// Where surfaces move by this share of the tolerance from query to query, contacts are large that have as many vertices more as a front has samples in contact; by twice
+/// that share, four times as many.
+const FAST: f64 = 0.03;
 /// Deeper than this share of the tolerance a contact is exact, until it is less deep than that one: a front shows nothing that is deeper than
 /// the tolerance, and a hard push must not go through.
 const DEEP: f64 = 0.5;
@@ -42,9 +43,10 @@ impl Pace {
         self.0 += SMOOTHING * (share - self.0);
     }
 
-    /// Vertices of a contact from where on it is large.
-    fn large(self) -> f64 {
-        LARGE * (1.0 + self.0 / SLOW)
+    /// Vertices of a contact from where on it is large, when a front has so many samples in contact.
+    fn large(self, wanted: f64) -> f64 {
+        let share = self.0 / FAST;
+        LARGE + wanted * share * share
     }
 }
 
@@ -87,7 +89,7 @@ impl Warmth {
     }
 }
 
-/// What an exact query found.
+/// What a query found.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     pub contacts: usize,
@@ -96,11 +98,13 @@ pub(super) struct Seen {
     /// Queries take longer than they may.
     pub late: bool,
     pub pace: Pace,
+    /// Samples that a front has in contact.
+    pub wanted: f64,
 }
 
 impl Seen {
     pub(super) fn asks_for_levels(&self) -> bool {
-        self.pressed <= SHALLOW_AGAIN && (self.contacts as f64 > self.pace.large() || self.late)
+        self.pressed <= SHALLOW_AGAIN && (self.contacts as f64 > self.pace.large(self.wanted) || self.late)
     }
 
     /// Searches that a query may spend on the fronts.
@@ -110,9 +114,9 @@ impl Seen {
 }
 
 /// What comes after a query by levels that found contacts of so many vertices in all.
-pub(super) fn after_levels(vertices: f64, pressed: f64, late: bool, pace: Pace) -> Way {
-    let small = vertices < SMALL_AGAIN * pace.large() && !late;
-    if pressed > DEEP || small { Way::Exact(1.0 / BLEND_STEPS) } else { Way::Levels }
+pub(super) fn after_levels(vertices: f64, seen: Seen) -> Way {
+    let small = vertices < SMALL_AGAIN * seen.pace.large(seen.wanted) && !seen.late;
+    if seen.pressed > DEEP || small { Way::Exact(1.0 / BLEND_STEPS) } else { Way::Levels }
 }
 
 /// A step from the weights of the front towards the own ones, or back.

@@ -16,9 +16,23 @@ struct Case {
     motion: Vec<Isometry3<f64>>,
 }
 
-/// What a front's nodes are off by at most.
-fn deviation(lod: Lod<'_>, nodes: &[u32]) -> f64 {
-    nodes.iter().map(|&n| lod.hierarchy.nodes[n as usize].deviation).fold(0.0, f64::max)
+/// What a front's nodes are off by: where a feature is (zero when no node of the front is there), and at most.
+fn deviations(lod: Lod<'_>, nodes: &[u32], feature: u32) -> [f64; 2] {
+    let surface = lod.surface;
+    let (vertices, edges) = (surface.vertices.len() as u32, surface.edges.len() as u32);
+    let is_there = |t: u32| {
+        if feature < vertices {
+            surface.triangles[t as usize].contains(&feature)
+        } else if feature < vertices + edges {
+            surface.triangle_edges[t as usize].contains(&(feature - vertices))
+        } else {
+            t == feature - vertices - edges
+        }
+    };
+    let own = nodes.iter().map(|&n| &lod.hierarchy.nodes[n as usize]);
+    let there =
+        own.clone().filter(|n| lod.hierarchy.triangles[range(n.triangles)].iter().any(|&t| is_there(t)));
+    [there.map(|n| n.deviation).fold(0.0, f64::max), own.map(|n| n.deviation).fold(0.0, f64::max)]
 }
 
 /// Asserts the bound along the motion; returns how many queries were by levels.
@@ -31,7 +45,7 @@ fn check(case: &Case) -> usize {
         let detail = Detail::threshold(share * built[0].radius());
         let (mut workspace, mut exact) = (LodWorkspace::new(), QueryWorkspace::new());
         workspace.watch(true);
-        let (mut worst, mut off) = (0.0f64, 0);
+        let (mut worst, mut off, mut strict) = (0.0f64, 0, 0);
         for (i, pose) in case.motion.iter().enumerate() {
             let d = case.tolerance;
             let found = query_levels(lods[0], pose, lods[1], &still, d, &detail, &mut workspace).min_distance;
@@ -41,14 +55,20 @@ fn check(case: &Case) -> usize {
             }
             let fronts = workspace.front();
             assert!(fronts.iter().any(|nodes| !nodes.is_empty()), "{} {share} {i}: {found}", case.name);
-            let allowed = 1e-12 + deviation(lods[0], fronts[0]) + deviation(lods[1], fronts[1]);
+            let closest = wanted.contacts.iter().max_by(|a, b| a.depth.total_cmp(&b.depth)).unwrap();
+            // The closest place of a surface may face away and make no contact; then nobody tells where it is.
+            let known = usize::from(closest.depth != -wanted.min_distance);
+            strict += 1 - known;
+            let features = [closest.body_feature, closest.obstacle_feature];
+            let allowed: f64 = (0..2).map(|k| deviations(lods[k], fronts[k], features[k])[known]).sum();
+            let allowed = allowed + 1e-12;
             let wrong = (found - wanted.min_distance).abs();
             (worst, off) = (worst.max(wrong), off + 1);
             assert!(wrong <= allowed, "{} {share} {i}: {found} {} {allowed}", case.name, wanted.min_distance);
         }
         by_levels += usize::from(workspace.way == Way::Levels);
         println!(
-            "{} {share}: {off} of {} not exact, by up to {:.6} mm",
+            "{} {share}: {off} of {} not exact, by up to {:.6} mm, the place known in {strict}",
             case.name,
             case.motion.len(),
             worst * 1e3

@@ -9,75 +9,39 @@ use crate::clod::nearest::{NOWHERE, Nearest, box_distances, misses_slab};
 use crate::query::feature::{self, Foot};
 use crate::query::kernel::{at_most, least, point_triangles};
 use crate::surface::{EMPTY, ERROR, LANES, LEAF, Surface};
-use crate::vector::Vec3;
+use crate::vector::{Vec3, norm, sub};
 
 /// Leaves that are remembered.
 const KEPT: usize = 6;
-/// Triangles that are remembered.
-const CLOSEST: usize = 3;
-/// They are worth remembering when all others are farther than the closest by this factor.
-const WORTH: f32 = 1.01;
 /// Covers the rounding of squares in single precision.
 const ROUNDING: f32 = 1.0 + 1e-6;
 
 /// What is known of a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Known {
-    /// The closest leaves of the other surface when it was last searched for, the surfaces having moved `searched` in all.
+    /// The closest leaves of the other surface when it was last searched for.
     leaves: [u32; KEPT],
-    /// Lower bounds of their distances when they were last looked at, plus what the surfaces had moved since the search.
+    /// Lower bounds of their distances at the search.
     lower: [f32; KEPT],
     /// Lower bound of the distances of all other leaves at the search.
     rest: f32,
-    /// The closest triangles of these leaves when the leaves were last looked at.
-    triangles: [u32; CLOSEST],
-    /// Lower bounds of their distances, and of those of all other triangles, each plus what the surfaces had moved since the search.
-    apart: [f32; CLOSEST],
-    others: f32,
     /// The triangle that the last foot was on.
-    triangle: u32,
+    pub triangle: u32,
     /// Whether `distance` is exact and not only a lower bound.
     pub exact: bool,
-    pub searched: f64,
+    /// Where it was at the search.
+    searched: Vec3,
     /// Its distance to the other surface, or a lower bound ...
     pub distance: f64,
     /// ... when the surfaces had moved this far in all.
     pub at: f64,
 }
 
-/// What is known of the vertices of a surface, in pages: only those near the other surface are ever looked at, and near vertices have
-/// close numbers.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Memory {
-    /// By page of vertices: where it is, plus one; zero as long as none of its vertices was looked at.
-    pages: Vec<u32>,
-    known: Vec<Known>,
-}
-
-/// Vertices in a page.
-const PAGE: usize = 32;
-
-impl Memory {
-    /// Forgets everything and makes room for a surface.
-    pub(super) fn new(surface: &Surface) -> Self {
-        Self { pages: vec![0; surface.vertices.len().div_ceil(PAGE)], known: Vec::new() }
-    }
-
-    /// Where a vertex has its place.
-    #[inline(always)]
-    pub(super) fn place(&mut self, vertex: u32) -> usize {
-        let page = vertex as usize / PAGE;
-        if self.pages[page] == 0 {
-            self.known.resize(self.known.len() + PAGE, Known::UNKNOWN);
-            self.pages[page] = (self.known.len() / PAGE) as u32;
-        }
-        (self.pages[page] as usize - 1) * PAGE + vertex as usize % PAGE
-    }
-
-    #[inline(always)]
-    pub(super) fn at(&mut self, place: usize) -> &mut Known {
-        &mut self.known[place]
-    }
+/// The triangles closest to a vertex, and a lower bound of the distances of all others.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Closest {
+    pub triangles: [u32; LANES],
+    pub rest: f64,
 }
 
 impl Known {
@@ -86,12 +50,9 @@ impl Known {
         leaves: [NOWHERE; KEPT],
         lower: [f32::INFINITY; KEPT],
         rest: 0.0,
-        triangles: [NOWHERE; CLOSEST],
-        apart: [f32::INFINITY; CLOSEST],
-        others: f32::NEG_INFINITY,
         triangle: NOWHERE,
         exact: false,
-        searched: f64::NEG_INFINITY,
+        searched: [f64::NAN; 3],
         distance: 0.0,
         at: f64::NEG_INFINITY,
     };
@@ -107,16 +68,14 @@ impl Known {
         band: f64,
         slack: f32,
         nearest: &mut Nearest,
+        searches: &mut usize,
     ) -> Option<Foot> {
-        let moved = search.travelled - self.searched;
-        let mut found = self.recall(p, search.other, moved);
-        if found.is_none() {
-            found = self.settle(p, search.other, moved, limit);
-        }
+        let mut found = self.settle(p, search.other, limit);
         if found.is_none() {
             self.search(p, search.other, limit, band, slack, &mut nearest.stack);
-            self.searched = search.travelled;
-            found = self.settle(p, search.other, 0.0, limit);
+            self.searched = p;
+            *searches += 1;
+            found = self.settle(p, search.other, limit);
         }
         // More leaves are equally far than are remembered.
         let (foot, distance) = found.unwrap_or_else(|| {
@@ -131,72 +90,53 @@ impl Known {
         foot.filter(|_| distance <= limit)
     }
 
-    /// The triangle that the last foot was on, and a lower bound of the distances of all others, plus what the surfaces had moved by then in
-    /// all. None when that is not known.
+    /// The triangles that are closest to a vertex at `p`, from the leaves that are within `reach`.
     #[inline(always)]
-    pub(super) fn held(&self) -> Option<(u32, f64)> {
-        let others = self.triangles.iter().zip(self.apart).filter(|(t, _)| **t != self.triangle);
-        let apart = others.fold(self.others, |least, (_, apart)| least.min(apart));
-        (self.triangle != NOWHERE).then(|| (self.triangle, f64::from(apart) + self.searched))
-    }
-
-    /// The closest foot and its distance, from the triangles that are remembered. None when they do not tell.
-    #[inline(always)]
-    fn recall(&mut self, p: Vec3, other: &Surface, moved: f64) -> Option<(Option<Foot>, f64)> {
-        if self.others == f32::NEG_INFINITY {
-            return None;
-        }
-        let mut best = None;
-        for k in 0..CLOSEST {
-            let (triangle, bound) = (self.triangles[k], f64::from(self.apart[k]) - moved);
-            if triangle == NOWHERE || best.is_some_and(|b: Best| bound > b.distance()) {
-                continue;
-            }
-            let foot = feature::foot(p, triangle, other);
-            self.apart[k] = ((foot.signed_distance.abs() + moved) as f32).next_down();
-            Best::take(&mut best, triangle, foot);
-        }
-        let best = best.filter(|b| b.distance() < f64::from(self.others) - moved)?;
-        self.triangle = best.triangle;
-        Some((Some(best.foot), best.distance()))
-    }
-
-    /// Remembers the closest of the triangles that were looked at, leaf by leaf.
-    #[inline(always)]
-    fn remember(
-        &mut self,
-        other: &Surface,
-        moved: f64,
-        looked: &[bool; KEPT],
-        squared: &[[f32; LANES]; KEPT],
-    ) {
-        self.triangles = [NOWHERE; CLOSEST];
-        self.apart = [f32::INFINITY; CLOSEST];
-        self.others = self.rest;
+    pub(super) fn closest(&self, p: Vec3, other: &Surface, reach: f64) -> Closest {
+        let moved = norm(sub(p, self.searched));
+        let mut result = Closest { triangles: [NOWHERE; LANES], rest: f64::from(self.rest) - moved };
+        let (mut lowers, mut dropped) = ([f32::INFINITY; LANES], f32::INFINITY);
+        let mut squared = [0.0; LANES];
         for k in (0..KEPT).filter(|&k| self.leaves[k] != NOWHERE) {
-            if !looked[k] {
-                self.others = self.others.min(self.lower[k]);
+            let bound = f64::from(self.lower[k]) - moved;
+            if bound > reach {
+                result.rest = result.rest.min(bound);
                 continue;
             }
-            let (leaf, block) =
-                (&other.leaves[self.leaves[k] as usize], &other.blocks[self.leaves[k] as usize]);
+            to_leaf(p, other, self.leaves[k], &mut squared);
+            let index = self.leaves[k] as usize;
+            let (leaf, block) = (&other.leaves[index], &other.blocks[index]);
             for lane in 0..usize::from(leaf.triangles) {
-                let far = squared[k][lane].sqrt();
-                let apart = ((f64::from(far - (block.error + ERROR * far)) + moved) as f32).next_down();
-                let dropped = insert((leaf.triangle(lane), apart), &mut self.triangles, &mut self.apart);
-                self.others = self.others.min(dropped);
+                let far = squared[lane].sqrt();
+                let lower = far - (block.error + ERROR * far);
+                let (triangle, kept) = (leaf.triangle(lane), &mut result.triangles);
+                dropped = dropped.min(if lower < lowers[LANES - 1] {
+                    insert((triangle, lower), kept, &mut lowers)
+                } else {
+                    lower
+                });
             }
         }
-        // Around a vertex more are equally far than are remembered.
-        if self.others < self.apart[0] * WORTH {
-            self.others = f32::NEG_INFINITY;
+        result.rest = result.rest.min(f64::from(dropped));
+        result
+    }
+
+    /// Whether some triangle is surely within a distance, as far as that shows without a search.
+    #[inline(always)]
+    pub(super) fn is_within(&self, p: Vec3, other: &Surface, limit: f64) -> bool {
+        let mut squared = [0.0; LANES];
+        self.leaves[0] != NOWHERE && {
+            let (near, wrong) = to_leaf(p, other, self.leaves[0], &mut squared);
+            f64::from(near + wrong) <= limit
         }
     }
 
     /// The closest foot and its distance, from the leaves that are remembered; none without a foot where all that is known is
     /// that the distance is at least so much, which is beyond the limit. None when they do not tell.
     #[inline(always)]
-    fn settle(&mut self, p: Vec3, other: &Surface, moved: f64, limit: f64) -> Option<(Option<Foot>, f64)> {
+    fn settle(&mut self, p: Vec3, other: &Surface, limit: f64) -> Option<(Option<Foot>, f64)> {
+        // Not a number before the first search.
+        let moved = norm(sub(p, self.searched));
         let rest = f64::from(self.rest) - moved;
         if !(rest > 0.0) {
             return None;
@@ -213,7 +153,6 @@ impl Known {
             }
             let (near, wrong) = to_leaf(p, other, self.leaves[k], &mut squared[k]);
             (looked[k], error[k]) = (true, wrong);
-            self.lower[k] = ((f64::from(near - wrong) + moved) as f32).next_down();
             lower = lower.min(f64::from(near - wrong));
             within = if near + wrong < within { near + wrong } else { within };
         }
@@ -235,7 +174,6 @@ impl Known {
                 Best::take(&mut best, triangle, feature::foot(p, triangle, other));
             }
         }
-        self.remember(other, moved, &looked, &squared);
         self.triangle = best.map_or(NOWHERE, |b: Best| b.triangle);
         best.map(|b: Best| (Some(b.foot), b.distance()))
     }
@@ -252,7 +190,6 @@ impl Known {
         stack: &mut Vec<(f32, u32)>,
     ) {
         let seeds = self.leaves;
-        self.others = f32::NEG_INFINITY;
         self.leaves = [NOWHERE; KEPT];
         self.lower = [f32::INFINITY; KEPT];
         let mut squared = [0.0; LANES];

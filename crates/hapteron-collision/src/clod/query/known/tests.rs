@@ -28,7 +28,7 @@ fn feet_are_the_closest_along_motions() {
     let still =
         Rigid { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
     let (limit, band) = (0.06, 0.03);
-    let (mut near, mut far) = (0, 0);
+    let (mut near, mut far, mut searches) = (0, 0, 0);
     for (round, step) in [0.0002, 0.001, 0.006, 0.05].into_iter().enumerate() {
         let (mut known, mut nearest) = (Known::UNKNOWN, Nearest::default());
         let (mut last, mut travelled) = ([0.0; 3], 0.0);
@@ -50,7 +50,7 @@ fn feet_are_the_closest_along_motions() {
                 tolerance: limit,
                 travelled,
             };
-            let found = known.look(p, &search, limit, band, 2e-6, &mut nearest);
+            let found = known.look(p, &search, limit, band, 2e-6, &mut nearest, &mut searches);
             let feet = (0..surface.triangles.len() as u32).map(|t| feature::foot(p, t, &surface));
             let least = feet.map(|f| f.signed_distance.abs()).fold(f64::INFINITY, f64::min);
             match found {
@@ -66,5 +66,6 @@ fn feet_are_the_closest_along_motions() {
             }
         }
     }
+    assert!(searches > 10 && searches < 800, "{searches}");
     assert!(near > 400 && far > 100, "{near} {far}");
 }
