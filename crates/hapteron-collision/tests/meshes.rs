@@ -260,3 +260,58 @@ proptest! {
         }
     }
 }
+
+/// Would catch a part of a file that is passed over in silence: each of these once lost a vertex, a face or the end of the mesh.
+#[test]
+fn nothing_of_a_file_is_passed_over() {
+    let expected = tetrahedron();
+    let text = String::from_utf8(obj(&expected)).unwrap();
+    let marked =
+        [b"\xef\xbb\xbf".to_vec(), text.strip_prefix("# made by a test\no thing\n").unwrap().into()].concat();
+    let commented = format!("# made in C:\\parts\\\n{}", text.split_once("o thing\n").unwrap().1);
+    let continued = format!("{}\\", text.trim_end());
+    for bytes in [marked, commented.into_bytes(), continued.into_bytes()] {
+        assert_eq!(parse(&bytes, Format::Obj, "t").unwrap(), expected);
+    }
+    let text = String::from_utf8(stl(&expected, false)).unwrap();
+    let one_line =
+        text.replace('\n', " ").replace("solid thing", "\nsolid thing\n").replace("end\nsolid", "\nendsolid");
+    for text in [text.to_uppercase(), one_line] {
+        assert_eq!(parse(text.as_bytes(), Format::Stl, "t").unwrap().triangles().len(), 4, "{text}");
+    }
+    let error = |bytes: &[u8], format| parse(bytes, format, "t").unwrap_err().to_string();
+    for end in [text.rfind("facet normal").unwrap(), text.rfind("endsolid").unwrap()] {
+        assert!(error(&text.as_bytes()[..end], Format::Stl).contains("truncated"));
+    }
+    let mut fewer = stl(&expected, true);
+    fewer[80] = 3;
+    assert!(error(&fewer, Format::Stl).contains("more follow"));
+    let text = String::from_utf8(off(&expected)).unwrap();
+    assert!(error(text.replace("\n4 4 0\n", "\n4 3 0\n").as_bytes(), Format::Off).contains("more follow"));
+    for encoding in ["ascii", "binary_little_endian"] {
+        let mut bytes = ply(&expected, encoding);
+        let at = bytes.windows(14).position(|w| w == b"element face 4").unwrap();
+        bytes[at + 13] = b'3';
+        assert!(error(&bytes, Format::Ply).contains("more follow"), "{encoding}");
+    }
+    assert!(error(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -9 1 2\n", Format::Obj).contains("vertex -9"));
+}
+
+/// Would catch a polygon that is not convex and whose notch is filled: the least distance into the notch of an L tells.
+#[test]
+fn faces_that_are_not_convex_keep_their_notch() {
+    let outline = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]];
+    let mut text = String::new();
+    for z in [0, 1] {
+        outline.iter().for_each(|[x, y]| writeln!(text, "v {x} {y} {z}").unwrap());
+    }
+    // Seen from the corner (2, 0), the notch lies across the fan.
+    text.push_str("f 2 1 6 5 4 3\nf 8 9 10 11 12 7\n");
+    (0..6).for_each(|i| {
+        writeln!(text, "f {} {} {} {}", i + 1, (i + 1) % 6 + 1, (i + 1) % 6 + 7, i + 7).unwrap()
+    });
+    let mesh = parse(text.as_bytes(), Format::Obj, "t").unwrap();
+    assert!(check(&mesh).is_closed());
+    assert!((check(&mesh).area - 14.0).abs() < 1e-12, "{}", check(&mesh).area);
+    assert!((mass_properties(&mesh).unwrap().volume - 3.0).abs() < 1e-12);
+}

@@ -255,7 +255,7 @@ fn nonsense_finds_nothing() {
     let still = Isometry3::identity();
     let lost = Isometry3::translation(f64::NAN, 0.0, 0.0);
     for (pose, tolerance) in
-        [(lost, 0.1), (still, f64::NAN), (still, -1.0), (still, f64::INFINITY), (still, 0.0)]
+        [(lost, 0.1), (still, f64::NAN), (still, -1.0), (still, f64::INFINITY), (still, -f64::MIN_POSITIVE)]
     {
         let mut workspace = QueryWorkspace::new();
         let found = query(&ball, &pose, &ball, &still, tolerance, &mut workspace);
@@ -293,5 +293,42 @@ fn crossing_bars_push_apart() {
         let found = query(&bar, &turned, &bar, &still, 0.01, &mut workspace);
         assert!((found.min_distance + overlap).abs() < 1e-6, "{overlap}: {}", found.min_distance);
         assert!(found.contacts.iter().any(|c| c.normal.z < -0.999 && (c.depth - overlap).abs() < 1e-6));
+    }
+}
+
+/// Would catch a tolerance of zero with which a body falls through another one unseen.
+#[test]
+fn a_tolerance_of_zero_finds_what_crosses() {
+    let (a, b) = (Surface::build(&block([0.1; 3])), Surface::build(&block([1.0; 3])));
+    let mut workspace = QueryWorkspace::new();
+    let mut at = |x| {
+        let pose = Isometry3::translation(x, 0.2, 0.3);
+        let found = query(&a, &pose, &b, &Isometry3::identity(), 0.0, &mut workspace);
+        (found.min_distance, found.contacts.len())
+    };
+    let (crossing, contacts) = at(1.05);
+    assert!((crossing + 0.05).abs() < 1e-12 && contacts > 0, "{crossing} {contacts}");
+    assert_eq!(at(1.1001), (f64::INFINITY, 0));
+}
+
+/// Would catch numbers that single precision does not hold: whatever the tolerance and the poses, a query ends, and a tolerance
+/// that covers everything finds the distance.
+#[test]
+fn any_tolerance_and_pose_is_answered() {
+    let (a, b) = (Surface::build(&block([0.1; 3])), Surface::build(&bumpy_ball(2, 0.1)));
+    let mut workspace = QueryWorkspace::new();
+    let sizes = [1e-300, 1e-30, 1e-3, 1e6, 1e12, 1e19, 1e30, 1e39, 1e160, 1e300, f64::MAX];
+    for tolerance in sizes {
+        for far in sizes {
+            let (pose, other) =
+                (Isometry3::translation(far, 0.0, 3.0), Isometry3::translation(0.0, 0.0, 1e-3 * far));
+            for other in [Isometry3::identity(), other] {
+                let found = query(&a, &pose, &b, &other, tolerance, &mut workspace);
+                assert!(!found.min_distance.is_nan() && found.contacts.iter().all(|c| c.depth.is_finite()));
+                if other == Isometry3::identity() && far <= 1e-3 {
+                    assert_eq!(found.min_distance.is_finite(), tolerance > 2.0, "{tolerance} {far}");
+                }
+            }
+        }
     }
 }

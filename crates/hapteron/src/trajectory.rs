@@ -39,6 +39,13 @@ pub struct PoseRow {
 /// # Errors
 /// A table that cannot be read, lacks a column, or holds a number that is none or not finite, or a quaternion far from unit length.
 pub fn read_poses(bytes: &[u8], name: &str) -> Result<Vec<PoseRow>, TrajectoryError> {
+    Ok(read_with_lines(bytes, name)?.0)
+}
+
+/// The rows, and the line of each.
+type RowsWithLines = (Vec<PoseRow>, Vec<Option<u64>>);
+
+fn read_with_lines(bytes: &[u8], name: &str) -> Result<RowsWithLines, TrajectoryError> {
     let fail = |line: Option<u64>, problem: String| TrajectoryError { file: name.to_owned(), line, problem };
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
     let header = reader.headers().map_err(|e| fail(None, e.to_string()))?.clone();
@@ -62,7 +69,7 @@ pub fn read_poses(bytes: &[u8], name: &str) -> Result<Vec<PoseRow>, TrajectoryEr
     if velocities.len() == VELOCITY.len() {
         columns.extend(velocities);
     }
-    let mut rows = Vec::new();
+    let (mut rows, mut lines) = (Vec::new(), Vec::new());
     for record in reader.records() {
         let record = record.map_err(|e| fail(e.position().map(csv::Position::line), e.to_string()))?;
         let line = record.position().map(csv::Position::line);
@@ -92,8 +99,9 @@ pub fn read_poses(bytes: &[u8], name: &str) -> Result<Vec<PoseRow>, TrajectoryEr
         let velocity = (columns.len() == 14)
             .then(|| [Vector3::new(v[8], v[9], v[10]), Vector3::new(v[11], v[12], v[13])]);
         rows.push(PoseRow { time: v[0], pose, velocity });
+        lines.push(line);
     }
-    Ok(rows)
+    Ok((rows, lines))
 }
 
 /// A motion of the handle over time.
@@ -108,7 +116,8 @@ impl Trajectory {
     /// # Errors
     /// As [`read_poses`], and when there are fewer than two rows or the times do not rise from row to row.
     pub fn parse(bytes: &[u8], name: &str) -> Result<Self, TrajectoryError> {
-        Self::from_rows(read_poses(bytes, name)?, name)
+        let (rows, lines) = read_with_lines(bytes, name)?;
+        Self::checked(rows, name, |row| lines[row])
     }
 
     /// Reads a motion from a file.
@@ -130,6 +139,15 @@ impl Trajectory {
     /// # Errors
     /// Fewer than two rows, or times that do not rise.
     pub fn from_rows(rows: Vec<PoseRow>, name: &str) -> Result<Self, TrajectoryError> {
+        // One line for the header, and lines count from 1.
+        Self::checked(rows, name, |row| Some(row as u64 + 2))
+    }
+
+    fn checked(
+        rows: Vec<PoseRow>,
+        name: &str,
+        line: impl Fn(usize) -> Option<u64>,
+    ) -> Result<Self, TrajectoryError> {
         let fail = |line, problem: String| TrajectoryError { file: name.to_owned(), line, problem };
         if rows.len() < 2 {
             let text = format!("{} rows; a trajectory needs at least two", rows.len());
@@ -141,8 +159,7 @@ impl Trajectory {
                     "time {} does not come after {}; sort the rows and drop repeated times",
                     pair[1].time, pair[0].time
                 );
-                // One line for the header, and lines count from 1.
-                return Err(fail(Some(index as u64 + 3), text));
+                return Err(fail(line(index + 1), text));
             }
         }
         Ok(Self { rows })
@@ -247,6 +264,8 @@ mod tests {
         let row = "0,0,0,0,1,0,0,0\n";
         assert!(error(&format!("{HEADER}{row}")).contains("at least two"));
         assert!(error(&format!("{HEADER}{row}0.1,0,0,0,1,0,0,0\n0.05,0,0,0,1,0,0,0\n")).contains("line 4"));
+        let commented = format!("{HEADER}# a\n\n{row}# b\n0.1,0,0,0,1,0,0,0\n0.05,0,0,0,1,0,0,0\n");
+        assert!(error(&commented).contains("line 7"));
         assert!(error(&format!("{HEADER}{row}0.1,0,NaN,0,1,0,0,0\n")).contains("column 'py'"));
         assert!(error(&format!("{HEADER}{row}0.1,0,0,0,3,0,0,0\n")).contains("unit quaternion"));
         assert!(error("t,px,py\n0,0,0\n").contains("'pz' is missing"));

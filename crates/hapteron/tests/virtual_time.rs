@@ -8,7 +8,7 @@ use hapteron::recording::Recording;
 use hapteron::scene::file::{Anticipation, ContactModel, Method};
 use hapteron::scene::{Changes, Scene, SceneFile};
 use hapteron::scenes::{spoon_in_cup, spoon_in_free_space};
-use hapteron::session::VirtualTime;
+use hapteron::session::{VirtualTime, run_virtual_for};
 use hapteron::trajectory::Trajectory;
 use std::path::Path;
 
@@ -155,4 +155,15 @@ fn a_closed_loop_has_the_same_bits_and_comes_back_from_its_written_scene() {
     assert_eq!(csv(&first), csv(&hapteron::session::run_virtual(&again, &mut |_| true).unwrap()));
     file.scene.seed = Some(8);
     assert_ne!(csv(&first), csv(&record(file)));
+}
+
+/// Would catch a typing error that fills the memory: times in milliseconds where seconds were meant, or worse.
+#[test]
+fn a_run_without_end_is_refused() {
+    let scene = Scene::from_file(spoon_in_free_space(0.01, Method::BackwardEuler)).unwrap();
+    for duration in [1e7, 1e300, f64::INFINITY, f64::NAN] {
+        let error = run_virtual_for(&scene, duration, &mut |_| false).unwrap_err().to_string();
+        assert!(error.contains("a billion steps"), "{error}");
+    }
+    assert_eq!(run_virtual_for(&scene, 0.005, &mut |_| true).unwrap().rows.len(), 5);
 }

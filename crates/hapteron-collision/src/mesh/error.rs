@@ -61,6 +61,14 @@ pub enum MeshProblem {
         /// How many the rest of the file can hold.
         room: u64,
     },
+    /// A header promises less than the file holds.
+    #[error("the header announces {announced} {what} but more follow; it is damaged, export it again")]
+    Excess {
+        /// What the header counts.
+        what: &'static str,
+        /// How many it says.
+        announced: u64,
+    },
     /// A word where a number should be.
     #[error("expected a number for {what}, found '{found}'")]
     NotANumber {

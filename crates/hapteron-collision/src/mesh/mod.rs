@@ -6,6 +6,7 @@ mod mass;
 mod obj;
 mod off;
 mod ply;
+mod polygon;
 mod stl;
 mod text;
 
@@ -191,6 +192,8 @@ pub fn load(path: impl AsRef<Path>) -> Result<TriMesh, MeshError> {
 /// # Errors
 /// As [`load`].
 pub fn parse(bytes: &[u8], format: Format, name: &str) -> Result<TriMesh, MeshError> {
+    // The mark that some editors put before a text in UTF-8.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     if bytes.iter().all(u8::is_ascii_whitespace) {
         return Err(MeshError::new(name, MeshProblem::Empty));
     }
@@ -206,10 +209,3 @@ pub fn parse(bytes: &[u8], format: Format, name: &str) -> Result<TriMesh, MeshEr
 
 /// What a parser returns: vertices and triangles, not yet checked.
 type Raw = (Vec<[f64; 3]>, Vec<[u32; 3]>);
-
-/// Cuts a polygon into triangles that share its first corner.
-fn fan(corners: &[u32], triangles: &mut Vec<[u32; 3]>) {
-    for pair in corners.windows(2).skip(1) {
-        triangles.push([corners[0], pair[0], pair[1]]);
-    }
-}

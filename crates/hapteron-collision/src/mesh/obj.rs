@@ -3,25 +3,29 @@
 //! Own rather than a crate's, because an error must name the line and the cure, and a comment in any encoding is no error.
 
 use super::error::{MeshError, MeshProblem};
-use super::{Raw, fan, text};
+use super::{Raw, polygon, text};
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
     let mut vertices: Vec<[f64; 3]> = Vec::new();
     let mut faces: Vec<(usize, Vec<i64>)> = Vec::new();
     let mut continued = String::new();
+    let last = 1 + bytes.iter().filter(|&&b| b == b'\n').count();
     for (number, line) in text::lines(bytes) {
         let line = line.trim_end_matches('\r');
-        if let Some(part) = line.strip_suffix('\\') {
+        let comment = continued.is_empty() && line.trim_start().starts_with('#');
+        let part = line.strip_suffix('\\').filter(|_| !comment);
+        if let Some(part) = part.filter(|_| number < last) {
             continued.push_str(part);
             continued.push(' ');
             continue;
         }
-        let whole =
-            if continued.is_empty() { line.to_owned() } else { std::mem::take(&mut continued) + line };
+        let whole = std::mem::take(&mut continued) + part.unwrap_or(line);
         let mut words = whole.split('#').next().unwrap_or_default().split_ascii_whitespace();
         let result = match words.next() {
             Some("v") => vertex(words).map(|v| vertices.push(v)),
-            Some("f") => face(words, vertices.len()).map(|corners| faces.push((number, corners))),
+            Some("f") => {
+                face(words, faces.len(), vertices.len()).map(|corners| faces.push((number, corners)))
+            }
             _ => Ok(()),
         };
         result.map_err(|problem| MeshError::at(number, problem))?;
@@ -38,7 +42,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
                 }
             })
             .collect();
-        fan(&corners.map_err(|problem| MeshError::at(*line, problem))?, &mut triangles);
+        let corners = corners.map_err(|problem| MeshError::at(*line, problem))?;
+        polygon::cut(&corners, &vertices, &mut triangles);
     }
     Ok((vertices, triangles))
 }
@@ -52,7 +57,11 @@ fn vertex<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 3], Mesh
 }
 
 /// Corners counted from 0; a negative index in the file counts back from the last vertex before the line.
-fn face<'a>(words: impl Iterator<Item = &'a str>, vertices_so_far: usize) -> Result<Vec<i64>, MeshProblem> {
+fn face<'a>(
+    words: impl Iterator<Item = &'a str>,
+    face: usize,
+    vertices: usize,
+) -> Result<Vec<i64>, MeshProblem> {
     let corners: Result<Vec<i64>, MeshProblem> = words
         .map(|word| {
             let index: i64 = text::number(word.split('/').next().unwrap_or_default(), "a vertex index")?;
@@ -61,7 +70,10 @@ fn face<'a>(words: impl Iterator<Item = &'a str>, vertices_so_far: usize) -> Res
                     "vertex index 0; OBJ counts from 1, export the mesh again".into(),
                 )),
                 1.. => Ok(index - 1),
-                _ => Ok(index.saturating_add(vertices_so_far as i64)),
+                _ if index.saturating_add(vertices as i64) < 0 => {
+                    Err(MeshProblem::Index { face, index, vertices })
+                }
+                _ => Ok(index + vertices as i64),
             }
         })
         .collect();

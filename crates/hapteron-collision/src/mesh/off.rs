@@ -2,7 +2,7 @@
 
 use super::error::{MeshError, MeshProblem};
 use super::text::{self, Words};
-use super::{Raw, fan};
+use super::{Raw, polygon};
 
 /// Whether the first word is OFF with one of its prefixes.
 pub(super) fn is_off(bytes: &[u8]) -> bool {
@@ -55,8 +55,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
                 }
             }
         }
-        fan(&corners, &mut triangles);
+        polygon::cut(&corners, &vertices, &mut triangles);
         words.skip_line();
+    }
+    if words.next("").is_ok() {
+        return Err(at(&words, MeshProblem::Excess { what: "faces", announced: announced[1] }));
     }
     Ok((vertices, triangles))
 }

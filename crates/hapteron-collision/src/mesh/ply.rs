@@ -4,7 +4,7 @@
 
 use super::error::{MeshError, MeshProblem};
 use super::text::{self, Words};
-use super::{Raw, fan};
+use super::{Raw, polygon};
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Encoding {
@@ -96,7 +96,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
             text::check_count(what, element.count, source.remaining(), size).map_err(|p| source.error(p))?;
         match what {
             "vertices" => read_vertices(&mut source, element, count, &mut vertices)?,
-            "faces" => read_faces(&mut source, element, count, vertices.len(), &mut triangles)?,
+            "faces" => read_faces(&mut source, element, count, &vertices, &mut triangles)?,
             _ => {
                 for _ in 0..count {
                     for property in &element.properties {
@@ -105,6 +105,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
                 }
             }
         }
+    }
+    if let Some(last) = elements.last().filter(|_| source.has_more()) {
+        return Err(source.error(MeshProblem::Excess { what: "entries", announced: last.count }));
     }
     Ok((vertices, triangles))
 }
@@ -206,7 +209,7 @@ fn read_faces(
     source: &mut Source<'_>,
     element: &Element,
     count: usize,
-    vertices: usize,
+    vertices: &[[f64; 3]],
     triangles: &mut Vec<[u32; 3]>,
 ) -> Result<(), MeshError> {
     let is_corners =
@@ -230,12 +233,13 @@ fn read_faces(
         }
         let mut indices = Vec::with_capacity(corners.len());
         for &corner in &corners {
-            if !(corner >= 0.0 && corner < vertices as f64 && corner.fract() == 0.0) {
-                return Err(source.error(MeshProblem::Index { face, index: corner as i64, vertices }));
+            if !(corner >= 0.0 && corner < vertices.len() as f64 && corner.fract() == 0.0) {
+                let index = corner as i64;
+                return Err(source.error(MeshProblem::Index { face, index, vertices: vertices.len() }));
             }
             indices.push(corner as u32);
         }
-        fan(&indices, triangles);
+        polygon::cut(&indices, vertices, triangles);
     }
     Ok(())
 }
@@ -251,6 +255,14 @@ impl Source<'_> {
         match self {
             Self::Text(words) => words.remaining(),
             Self::Binary { rest, .. } => rest.len(),
+        }
+    }
+
+    /// Whether anything but white space is left.
+    fn has_more(&mut self) -> bool {
+        match self {
+            Self::Text(words) => words.next("").is_ok(),
+            Self::Binary { rest, .. } => !rest.iter().all(|b| b.is_ascii_whitespace() || *b == 0),
         }
     }
 

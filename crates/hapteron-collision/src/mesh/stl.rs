@@ -22,8 +22,8 @@ fn announced(bytes: &[u8]) -> Option<u64> {
 pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
     let beginning = &bytes[..bytes.len().min(1024)];
     let facet = beginning.windows(5).any(|w| w.eq_ignore_ascii_case(b"facet"));
-    if !is_binary(bytes) && (facet || bytes.len() < HEADER) && bytes.trim_ascii_start().starts_with(b"solid")
-    {
+    let solid = bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    if !is_binary(bytes) && (facet || bytes.len() < HEADER) && solid {
         text_facets(bytes)
     } else {
         binary_facets(bytes)
@@ -69,6 +69,9 @@ fn binary_facets(bytes: &[u8]) -> Result<Raw, MeshError> {
         triangles
             .push([0, 3, 6].map(|i| welder.index([coordinate(i), coordinate(i + 1), coordinate(i + 2)])));
     }
+    if body.len() >= (count + 1) * FACET {
+        return Err(MeshProblem::Excess { what: "triangles", announced }.into());
+    }
     if (triangles.len() as u64) < announced {
         let room = triangles.len() as u64;
         return Err(MeshProblem::Lying { what: "triangles", announced, room }.into());
@@ -83,14 +86,15 @@ fn text_facets(bytes: &[u8]) -> Result<Raw, MeshError> {
     let mut corners = Vec::with_capacity(3);
     words.next("'solid'")?;
     words.skip_line();
+    let mut open = true;
     loop {
         let (line, word) = match words.next("the solid: 'endsolid' is missing") {
             Ok(found) => found,
             // Several solids may follow one another; the file may end after any of them.
-            Err(error) if !corners.is_empty() || triangles.is_empty() => return Err(error),
+            Err(error) if open || triangles.is_empty() => return Err(error),
             Err(_) => break,
         };
-        match word {
+        match word.to_ascii_lowercase().as_str() {
             "vertex" => {
                 let point = [words.coordinate()?, words.coordinate()?, words.coordinate()?];
                 corners.push(welder.index(point));
@@ -99,14 +103,27 @@ fn text_facets(bytes: &[u8]) -> Result<Raw, MeshError> {
                 if corners.len() < 3 {
                     return Err(MeshError::at(line, MeshProblem::FewCorners { corners: corners.len() }));
                 }
-                super::fan(&corners, &mut triangles);
+                super::polygon::cut(&corners, &welder.vertices, &mut triangles);
                 corners.clear();
             }
-            "solid" | "endsolid" | "facet" => words.skip_line(),
-            "outer" | "loop" | "endfacet" => {}
-            other => {
+            // Not used, and often not even a number.
+            "normal" => {
+                for _ in 0..3 {
+                    words.next("a normal")?;
+                }
+            }
+            "solid" => {
+                open = true;
+                words.skip_line();
+            }
+            "endsolid" => {
+                open = false;
+                words.skip_line();
+            }
+            "facet" | "outer" | "loop" | "endfacet" => {}
+            _ => {
                 let text =
-                    format!("unexpected word '{}' in a text STL", other.chars().take(40).collect::<String>());
+                    format!("unexpected word '{}' in a text STL", word.chars().take(40).collect::<String>());
                 return Err(MeshError::at(line, MeshProblem::Syntax(text)));
             }
         }

@@ -34,6 +34,11 @@ const AHEAD: f64 = 0.5;
 const STEPS_AHEAD: f64 = 8.0;
 /// For a workspace that was told how far to look ahead.
 const MORE_STEPS_AHEAD: f64 = 32.0;
+/// A smaller tolerance counts as this one, metres: nothing but what crosses.
+const LEAST_TOLERANCE: f64 = 1e-12;
+/// A greater tolerance counts as this one, metres: farther apart than the largest meshes are wide, and with squares that single
+/// precision holds.
+const GREATEST_TOLERANCE: f64 = 1e12;
 
 /// The two surfaces and where they are.
 #[derive(Clone, Copy)]
@@ -177,7 +182,7 @@ pub struct QueryResult<'a> {
 /// Finds where two surfaces are closer than `tolerance` (metres) or cross.
 ///
 /// `world_from_body` and `world_from_obstacle` are the poses of the mesh frames in the world, and so are the contacts. A
-/// pose or tolerance that is not finite, or a tolerance that is not positive, finds nothing. Not for the haptic thread: the time
+/// pose or tolerance that is not finite, or a negative tolerance, finds nothing; a tolerance of zero finds what crosses. Not for the haptic thread: the time
 /// depends on the contact.
 pub fn query<'a>(
     body: &Surface,
@@ -190,8 +195,13 @@ pub fn query<'a>(
     workspace.contacts.clear();
     let relative = world_from_obstacle.inv_mul(world_from_body);
     let valid =
-        tolerance > 0.0 && tolerance.is_finite() && is_finite(&relative) && is_finite(world_from_obstacle);
+        tolerance >= 0.0 && tolerance.is_finite() && is_finite(&relative) && is_finite(world_from_obstacle);
     if !valid || body.nodes.is_empty() || obstacle.nodes.is_empty() {
+        return QueryResult { min_distance: f64::INFINITY, contacts: &workspace.contacts };
+    }
+    let tolerance = tolerance.clamp(LEAST_TOLERANCE, GREATEST_TOLERANCE);
+    let offset = relative.translation.vector.amax();
+    if offset > tolerance + body.radius + obstacle.radius {
         return QueryResult { min_distance: f64::INFINITY, contacts: &workspace.contacts };
     }
     let motion = Rigid::from_isometry(&relative);

@@ -155,7 +155,8 @@ impl Node {
 /// Vertices that coincide exactly are one. Any mesh is accepted: the sign of a depth is taken from the normal of the
 /// closest feature (face, edge or vertex, the last two with angle-weighted pseudo-normals), so that for a closed and
 /// consistently oriented surface it is exact; behind an open sheet counts as inside, and beyond the rim of an open sheet, or
-/// nearest to an edge that has more than two faces or two of opposite orientation, counts as outside.
+/// nearest to an edge that has more than two faces or two of opposite orientation, counts as outside. An edge that runs through an
+/// open surface shows by its ends only, as far as they are within the tolerance of it.
 #[derive(Clone, Debug)]
 pub struct Surface {
     pub(crate) vertices: Vec<[f64; 3]>,

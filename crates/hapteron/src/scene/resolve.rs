@@ -22,6 +22,8 @@ const BUILTIN: &str = "builtin:";
 const DENSITY: f64 = 1000.0;
 /// Radius of a contact cluster as a share of the body's.
 const CLUSTER_RADIUS: f64 = 0.15;
+/// Shortest step and period, seconds: below it a scene of a second takes hours, and its record more memory than there is.
+const SHORTEST: f64 = 1e-6;
 /// A quaternion this close to unit length is used bit for bit.
 const EXACT_UNIT: f64 = 1e-14;
 
@@ -29,7 +31,7 @@ pub(super) type Resolved<T> = Result<T, SceneError>;
 
 pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Resolved<Scene> {
     let resolver = Resolver { source, folder };
-    let time_step = resolver.positive("integrator.time_step", &mut file.integrator.time_step, 1e-3)?;
+    let time_step = resolver.interval("integrator.time_step", &mut file.integrator.time_step, 1e-3)?;
     let method = *file.integrator.method.get_or_insert(file::Method::BackwardEuler);
     file.scene.name.get_or_insert_with(|| "scene".to_owned());
     file.scene.seed.get_or_insert(0);
@@ -99,6 +101,14 @@ impl Resolver<'_> {
             return Ok(v);
         }
         Err(self.source.fault(key, format!("is {v}; it must be positive and finite")))
+    }
+
+    fn interval(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
+        let v = self.positive(key, value, default)?;
+        if v >= SHORTEST {
+            return Ok(v);
+        }
+        Err(self.source.fault(key, format!("is {v}; it must be at least {SHORTEST} seconds")))
     }
 
     pub(super) fn not_negative(&self, key: &str, value: &mut Option<f64>, default: f64) -> Resolved<f64> {
@@ -399,7 +409,7 @@ impl Resolver<'_> {
             cluster_radius: CLUSTER_RADIUS * model.surface.radius(),
             model: *c.model.get_or_insert(ContactModel::Planes),
             anticipation,
-            period: self.positive("contact_thread.period", &mut thread.period, time_step)?,
+            period: self.interval("contact_thread.period", &mut thread.period, time_step)?,
             latency: self.not_negative("contact_thread.latency", &mut thread.latency, time_step)?,
         })
     }

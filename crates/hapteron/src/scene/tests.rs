@@ -78,6 +78,9 @@ fn faults_name_the_line_the_key_and_the_cure() {
     assert!(fault("contact/anticipation = -0.1").contains("not negative"));
     assert!(fault("contact_thread/period = 0").contains("positive"));
     assert!(fault("integrator/time_step = inf").contains("positive"));
+    // Such a step would ask for terabytes, and such a period would not let a tick end.
+    assert!(fault("integrator/time_step = 1e-12").contains("at least 0.000001 seconds"));
+    assert!(fault("contact_thread/period = 1e-12").contains("at least 0.000001 seconds"));
     assert!(fault("hand/mass = 1").contains("together"));
     assert!(fault("device/position_scale = 0").contains("position_scale"));
     assert!(fault("hand/grip = \"light\"\nmass = 1").contains("`hand.grip`: stands beside"));

@@ -19,6 +19,9 @@ use hapteron_device::{Device, DeviceSample};
 /// Times closer than this are equal, seconds.
 const SAME_TIME: f64 = 1e-9;
 
+/// A run of more ticks is refused: its record would not fit into any memory.
+const MOST_TICKS: f64 = 1e9;
+
 /// How far a run has come, told from time to time; answering `false` stops it.
 pub type Progress<'a> = &'a mut dyn FnMut(f64) -> bool;
 
@@ -194,6 +197,13 @@ pub fn run_virtual_for(
     duration: f64,
     progress: Progress<'_>,
 ) -> Result<Recording, SceneError> {
+    if !(duration / scene.time_step <= MOST_TICKS) {
+        let text = format!(
+            "{duration} s are more than a billion steps of {} s; end earlier (--duration)",
+            scene.time_step
+        );
+        return Err(fault(scene, text));
+    }
     let mut session = VirtualTime::new(scene)?;
     let ticks = (duration / scene.time_step + SAME_TIME / scene.time_step).floor() as u64;
     let mut recording = Recording::new();
