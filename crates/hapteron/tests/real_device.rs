@@ -11,13 +11,24 @@ use hapteron::device::{DeviceFault, drivers};
 use hapteron::scene::file::{Guard, Method};
 use hapteron::scene::{Changes, Scene};
 use hapteron::scenes::spoon_in_cup;
-use hapteron::session::real_time::{End, RealTime, RealTimeOptions, Recorder, Told};
+use hapteron::session::real_time::{End, RealTime, RealTimeOptions, Recorder, Running, Told};
 use hapteron::session::replay;
 use hapteron_emulators::{Generation, HaplyService, VrpnServer};
 use nalgebra::Vector3;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+
+/// Starts a session with the device that the scene names.
+fn start(mut scene: Scene) -> (Arc<Scene>, Running) {
+    let (kind, options) = scene.driver().unwrap();
+    let device = drivers::open(kind, &options).unwrap();
+    scene.adopt(device.capabilities()).unwrap();
+    let scene = Arc::new(scene);
+    let options = RealTimeOptions { watchdog: Duration::from_secs(2), ..RealTimeOptions::of(&scene) };
+    let running = RealTime::start(Arc::clone(&scene), device, options).unwrap();
+    (scene, running)
+}
 
 /// The spoon in the cup, for whoever comes with a device.
 fn scene(kind: &str, options: &[(&str, toml::Value)]) -> Scene {
@@ -107,16 +118,8 @@ fn sessions_with_the_vendors_libraries_push_the_hand_and_end_with_the_device() {
             emulator.set("period_us", 900.0);
             options.push(("patience", 1.0.into()));
         }
-        let mut scene = scene(kind, &options);
-        let device = {
-            let (kind, options) = scene.driver().unwrap();
-            drivers::open(kind, &options).unwrap()
-        };
-        scene.adopt(device.capabilities()).unwrap();
+        let (scene, mut running) = start(scene(kind, &options));
         let limit = scene.guard.unwrap().max_force;
-        let scene = Arc::new(scene);
-        let options = RealTimeOptions { watchdog: Duration::from_secs(2), ..RealTimeOptions::of(&scene) };
-        let mut running = RealTime::start(Arc::clone(&scene), device, options).unwrap();
         let mut recorder = Recorder::new(Arc::clone(&scene));
         let (started, mut greatest, mut gone) = (Instant::now(), 0.0_f64, false);
         while !running.is_over() && started.elapsed() < Duration::from_secs(60) {
@@ -163,16 +166,9 @@ fn a_session_with_a_vrpn_server_pushes_the_hand_and_ends_with_it() {
         ("force_device", "Phantom0"),
         ("patience", "5"),
     ];
-    let mut scene = scene("vrpn", &options.map(|(key, value)| (key, value.to_owned().into())));
-    let device = {
-        let (kind, options) = scene.driver().unwrap();
-        drivers::open(kind, &options).unwrap()
-    };
-    scene.adopt(device.capabilities()).unwrap();
+    let options = options.map(|(key, value)| (key, value.to_owned().into()));
+    let (scene, mut running) = start(scene("vrpn", &options));
     let limit = scene.guard.unwrap().max_force;
-    let scene = Arc::new(scene);
-    let options = RealTimeOptions { watchdog: Duration::from_secs(2), ..RealTimeOptions::of(&scene) };
-    let mut running = RealTime::start(Arc::clone(&scene), device, options).unwrap();
     let (started, mut greatest, mut felt) = (Instant::now(), 0.0_f64, 0.0_f64);
     while !running.is_over() && started.elapsed() < Duration::from_secs(60) {
         std::thread::sleep(Duration::from_millis(5));
