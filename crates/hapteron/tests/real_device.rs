@@ -50,15 +50,9 @@ fn a_session_with_a_driver_pushes_the_hand_and_ends_with_the_device() {
     let service = HaplyService::start(Generation::V35);
     // Far from where the body is.
     service.state().hand.target = Vector3::new(0.0, 0.05, 0.02);
-    let mut scene =
-        scene("haply", &[("address", service.address().to_owned().into()), ("patience", 0.5.into())]);
-    let (kind, options) = scene.driver().map(|(k, o)| (k.to_owned(), o)).unwrap();
-    let device = drivers::open(&kind, &options).unwrap();
-    scene.adopt(device.capabilities()).unwrap();
+    let options = [("address", service.address().to_owned().into()), ("patience", 0.5.into())];
+    let (scene, mut running) = start(scene("haply", &options));
     let limit = scene.guard.unwrap().max_force;
-    let scene = Arc::new(scene);
-    let options = RealTimeOptions { watchdog: Duration::from_secs(2), ..RealTimeOptions::of(&scene) };
-    let mut running = RealTime::start(Arc::clone(&scene), device, options).unwrap();
     let mut recorder = Recorder::new(Arc::clone(&scene));
     let (started, mut greatest, mut gone) = (Instant::now(), 0.0_f64, false);
     let mut early = Vec::new();
