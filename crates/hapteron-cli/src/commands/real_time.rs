@@ -9,8 +9,8 @@ use anyhow::{Context, Result, bail};
 use hapteron::device::{Device, drivers};
 use hapteron::scene::Scene;
 use hapteron::session::real_time::{
-    Finished, PassRecord, RealTime, RealTimeOptions, Running, SceneDevice, Spool, Spooled, TickRecord, Told,
-    system,
+    Finished, ON_TIME_NS, PassRecord, RealTime, RealTimeOptions, Running, SceneDevice, Spool, Spooled,
+    TickRecord, Told, system,
 };
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -220,7 +220,7 @@ pub fn print_timing(out: &mut impl Write, live: &Live) -> std::io::Result<()> {
         "  {} ticks, {} deadlines missed; {:.2} % at most 50 us late; lateness 99 % {:.1} us, 99.9 % {:.1} us, greatest {:.1} us",
         timing.ticks,
         timing.missed,
-        late.share_up_to(50_000) * 100.0,
+        late.share_up_to(ON_TIME_NS) * 100.0,
         us(late.quantile_ns(0.99)),
         us(late.quantile_ns(0.999)),
         us(late.greatest_ns)
@@ -230,7 +230,7 @@ pub fn print_timing(out: &mut impl Write, live: &Live) -> std::io::Result<()> {
         writeln!(
             out,
             "  a bare loop between the ticks: {:.2} % at most 50 us late; 99 % {:.1} us, 99.9 % {:.1} us, greatest {:.1} us",
-            bare.share_up_to(50_000) * 100.0,
+            bare.share_up_to(ON_TIME_NS) * 100.0,
             us(bare.quantile_ns(0.99)),
             us(bare.quantile_ns(0.999)),
             us(bare.greatest_ns)

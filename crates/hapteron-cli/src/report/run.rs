@@ -7,7 +7,7 @@ use super::{Cell, Page};
 use crate::commands::faults::Fault;
 use anyhow::Result;
 use hapteron::scene::{ContactModel, Scene};
-use hapteron::session::real_time::{End, Grants, Timing};
+use hapteron::session::real_time::{End, Grants, ON_TIME_NS, Timing};
 
 /// A session in real time, beside its recording.
 pub struct Live {
@@ -68,7 +68,7 @@ pub fn run(outcome: Outcome<'_>, notes: &[String]) -> Result<String> {
             (format!("{:.2} x", summary.duration / wall.max(1e-9)), "real time, computed")
         }
         Time::Real(live) => {
-            let share = live.timing.lateness.share_up_to(50_000) * 100.0;
+            let share = live.timing.lateness.share_up_to(ON_TIME_NS) * 100.0;
             (format!("{share:.2} %"), "of the ticks at most 50 us late")
         }
     };

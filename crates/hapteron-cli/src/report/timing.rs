@@ -3,7 +3,7 @@
 use super::plot::{Plot, Plots};
 use super::run::Live;
 use super::{Cell, Page};
-use hapteron::session::real_time::{Distribution, Grants, Timing};
+use hapteron::session::real_time::{Distribution, Grants, ON_TIME_NS, Timing};
 use serde_json::{Value, json};
 
 /// Shares of a distribution that are named.
@@ -146,7 +146,7 @@ pub fn json(live: &Live) -> Value {
             "greatest_torque": timing.undelivered.greatest_torque,
         },
         "faults": live.faults.iter().map(|f| json!({"time": f.time, "rearmed": f.rearmed, "reason": f.reason})).collect::<Vec<_>>(),
-        "within_50_us": timing.lateness.share_up_to(50_000),
+        "within_50_us": timing.lateness.share_up_to(ON_TIME_NS),
         "lateness_99_9_ratio": ratio_json(timing),
         "nanoseconds": histograms,
     })

@@ -12,7 +12,9 @@ use anyhow::{Result, bail};
 use hapteron::dynamics::{ContactForce, ContactPlane, Method, Problem, step};
 use hapteron::scene::Scene;
 use hapteron::scenes;
-use hapteron::session::real_time::{Distribution, RealTime, RealTimeOptions, SceneDevice, Timing, bare_loop};
+use hapteron::session::real_time::{
+    Distribution, ON_TIME_NS, RealTime, RealTimeOptions, SceneDevice, Timing, bare_loop,
+};
 use hapteron::session::{ContactPass, ContactSnapshot, VirtualTime, handle_speed};
 use serde_json::{Value, json};
 use std::io::Write;
@@ -109,7 +111,7 @@ fn lateness(out: &mut impl Write, what: &str, d: &Distribution, missed: u64) -> 
     writeln!(
         out,
         "  {what:30} within 50 us {:6.2} %   99 % {:7.1} us   99.9 % {:7.1} us ({:.1} to {:.1})   greatest {:7.1} us   missed {missed} of {}",
-        d.share_up_to(50_000) * 100.0,
+        d.share_up_to(ON_TIME_NS) * 100.0,
         us(d.quantile_ns(0.99)),
         us(d.quantile_ns(0.999)),
         us(low),

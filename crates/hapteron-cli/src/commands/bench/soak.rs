@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use hapteron::scene::Scene;
 use hapteron::scenes;
 use hapteron::session::real_time::{
-    RealTime, RealTimeOptions, Running, SceneDevice, TickRecord, Timing, Told, clock,
+    ON_TIME_NS, RealTime, RealTimeOptions, Running, SceneDevice, TickRecord, Timing, Told, clock,
     system::{allocated_bytes, resident_bytes},
 };
 use serde_json::{Value, json};
@@ -216,7 +216,7 @@ fn as_json(followed: &Followed, verdict: &Verdict, timing: &Timing) -> Value {
         "clock_drift_s": followed.clock_drift,
         "missed": timing.missed,
         "records_lost": timing.lost,
-        "within_50_us": timing.lateness.share_up_to(50_000),
+        "within_50_us": timing.lateness.share_up_to(ON_TIME_NS),
         "lateness_p99_9_ns": timing.lateness.quantile_ns(0.999),
         "good": verdict.good,
     })
@@ -232,7 +232,7 @@ fn print(followed: &Followed, verdict: &Verdict, timing: &Timing) -> Result<()> 
         followed.cycles.len(),
         timing.missed,
         timing.lost,
-        timing.lateness.share_up_to(50_000) * 100.0,
+        timing.lateness.share_up_to(ON_TIME_NS) * 100.0,
         timing.lateness.quantile_ns(0.999) as f64 * 1e-3
     )?;
     let mib = |bytes: u64| bytes as f64 / 1_048_576.0;

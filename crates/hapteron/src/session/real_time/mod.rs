@@ -35,7 +35,7 @@ pub use scene_device::SceneDevice;
 pub use shared::End;
 pub use spool::{Spool, SpoolError, Spooled};
 pub use system::{Grant, Grants};
-pub use telemetry::{LatenessRatio, PassRecord, TickRecord, Timing, Undelivered};
+pub use telemetry::{LatenessRatio, ON_TIME_NS, PassRecord, TickRecord, Timing, Undelivered};
 
 use super::contact_pass::sample_speed;
 use super::{Command, ContactLaw, ContactPass, ContactSnapshot, Flags, HapticState, Settings, View, tick};
