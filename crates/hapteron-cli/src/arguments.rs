@@ -88,7 +88,7 @@ pub struct Demo {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Seconds [default: 10]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = duration)]
     pub duration: Option<f64>,
     /// Run on the deterministic schedule, as fast as the machine can
     #[arg(long)]
@@ -117,7 +117,7 @@ pub struct Run {
     #[arg(long)]
     pub virtual_time: bool,
     /// End after so many seconds [default: with the scene's motion]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = duration)]
     pub duration: Option<f64>,
     /// Let the handle follow this motion exactly (t,px,py,pz,qw,qx,qy,qz) instead of the scene's hand; or make a session again from its device.csv
     /// (in virtual time; the same bits, or what they would have been under --set)
@@ -225,10 +225,10 @@ pub struct Bench {
     #[arg(long)]
     pub json: bool,
     /// How long each of the two loops runs; with --window, how long each way of treating the window is watched
-    #[arg(long, default_value_t = 10.0, value_name = "N")]
+    #[arg(long, default_value_t = 10.0, value_name = "N", value_parser = duration)]
     pub seconds: f64,
     /// Instead: a session for so many seconds, and whether it leaks memory or drifts
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = duration)]
     pub soak: Option<f64>,
     /// Instead: whether ticks come later while the window of `hapteron live` is open, moved, resized or frozen, and when it opens and closes;
     /// it is opened on this display several times
@@ -309,6 +309,14 @@ fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if (0.0..=1e6).contains(&seconds) => Ok(seconds),
         _ => Err("must be a number of seconds, not negative".to_owned()),
+    }
+}
+
+/// How long something lasts.
+fn duration(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds.is_finite() => Ok(seconds),
+        _ => Err("must be a positive number of seconds".to_owned()),
     }
 }
 

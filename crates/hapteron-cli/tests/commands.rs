@@ -207,6 +207,8 @@ fn ctrl_c_ends_a_session_with_complete_files() {
             && folder.read("r/timing.json").contains("\"stopped\"")
     );
     let again = hapteron(&folder, &["run", "r/scene.toml", "--replay", "r/device.csv", "--out", "again"]);
+    let shorter = ["run", "r/scene.toml", "--replay", "r/device.csv", "--duration", "1"];
+    fails(&folder, 1, &shorter, &["--duration does not go with r/device.csv"]);
     assert!(again.status.success(), "{}", stderr(&again));
     assert!(folder.read("again/run.csv") == folder.read("r/run.csv"));
 }
@@ -222,5 +224,8 @@ fn a_scene_with_a_driver_needs_no_motion_but_its_device() {
     fails(&folder, 1, &["run", "s.toml", "--out", "r"], &["127.0.0.1:1"]);
     fails(&folder, 1, &["run", "s.toml", "--virtual-time"], &["[hand] trajectory"]);
     fails(&folder, 1, &["run", "s.toml", "--set", "device.kind=\"haplee\""], &["did you mean 'haply'"]);
-    fails(&folder, 1, &["run", "s.toml", "--duration=-1"], &["positive number of seconds"]);
+    for seconds in ["-1", "0", "nan", "inf", "soon"] {
+        let duration = format!("--duration={seconds}");
+        fails(&folder, 2, &["run", "s.toml", &duration], &["positive number of seconds"]);
+    }
 }

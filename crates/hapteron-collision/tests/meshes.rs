@@ -297,6 +297,43 @@ fn nothing_of_a_file_is_passed_over() {
     assert!(error(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -9 1 2\n", Format::Obj).contains("vertex -9"));
 }
 
+/// Would catch files of other programs that are refused or misread: OFF without the number of edges, with colours that its header does not announce, with
+/// counts in lines of their own; and lines that end in a carriage return alone. Vertices that only look as if they had colours are an error.
+#[test]
+fn loosely_written_files_are_read() {
+    let expected = tetrahedron();
+    let text = String::from_utf8(off(&expected)).unwrap();
+    let coloured = |behind: &str| {
+        let lines = text.lines().enumerate();
+        lines
+            .map(|(i, line)| format!("{line}{}\n", if (2..6).contains(&i) { behind } else { "" }))
+            .collect::<String>()
+    };
+    for loose in [
+        text.replace("4 4 0", "4 4"),
+        text.replace("4 4 0", "4\n4\n0"),
+        text.replace("4 4 0", "4 4\n0"),
+        coloured(" 255 0 0"),
+        coloured(" 0.5 0 0 1 # red"),
+        coloured(" 7").replace("4 4 0", "4 4"),
+        text.replace('\n', "\r\n"),
+        text.replace('\n', "\r"),
+    ] {
+        let read = parse(loose.as_bytes(), Format::Off, "t").unwrap();
+        assert_eq!(
+            (read.vertices(), read.triangles()),
+            (expected.vertices(), expected.triangles()),
+            "{loose}"
+        );
+    }
+    let read =
+        parse(String::from_utf8(obj(&expected)).unwrap().replace('\n', "\r").as_bytes(), Format::Obj, "t");
+    assert_eq!(read.unwrap().triangles(), expected.triangles());
+    let two_a_line = "OFF\n4 1 0\n0 0 0 1 0 0\n0 1 0 0 0 1\n3 0 1 2\n";
+    let error = parse(two_a_line.as_bytes(), Format::Off, "t").unwrap_err().to_string();
+    assert!(error.contains("line 5") && error.contains("line of its own"), "{error}");
+}
+
 /// Would catch a polygon that is not convex and whose notch is filled: the least distance into the notch of an L tells.
 #[test]
 fn faces_that_are_not_convex_keep_their_notch() {

@@ -2,7 +2,7 @@
 
 use super::real_time::{self, Plan};
 use crate::arguments::Demo;
-use crate::commands::run::{checked, free_folder, run_into};
+use crate::commands::run::{free_folder, run_into};
 use crate::progress::say;
 use anyhow::Result;
 use hapteron::scene::Scene;
@@ -20,7 +20,7 @@ pub fn demo(arguments: &Demo) -> Result<ExitCode> {
         "The upper jaw (47,340 triangles) in a simulated hand is held on the lower one (40,180), at 1 kHz, {time}."
     );
     let scene = Scene::from_file(scenes::demo())?;
-    let duration = checked(arguments.duration)?;
+    let duration = arguments.duration;
     let folder = arguments.out.clone().unwrap_or_else(|| free_folder("demo"));
     if arguments.virtual_time {
         return run_into(&scene, duration, &folder);

@@ -21,7 +21,7 @@ pub fn run(arguments: &Run) -> Result<ExitCode> {
     let trajectory = if log.is_some() { None } else { arguments.replay.clone() };
     let changes = Changes { overrides: arguments.overrides.clone(), replay: trajectory };
     let scene = Scene::load(&arguments.scene, &changes)?;
-    let duration = checked(arguments.duration)?;
+    let duration = arguments.duration;
     let default =
         arguments.scene.file_stem().map_or_else(|| "run".into(), |s| s.to_string_lossy().into_owned());
     let folder = match &arguments.out {
@@ -29,6 +29,12 @@ pub fn run(arguments: &Run) -> Result<ExitCode> {
         None => free_folder(&default),
     };
     if let Some(path) = log {
+        if duration.is_some() {
+            bail!(
+                "--duration does not go with {}: a session is made again as long as it was",
+                path.display()
+            );
+        }
         return replay_into(&scene, path, &folder);
     }
     if arguments.virtual_time && scene.file.hand.trajectory.is_none() {
@@ -43,16 +49,6 @@ pub fn run(arguments: &Run) -> Result<ExitCode> {
     let on_fault = arguments.on_fault;
     let plan = Plan { duration, bare: false, repeat: false, recorded_motion, on_fault };
     real_time::run_into(scene, &plan, &folder)
-}
-
-/// A number of seconds that a run can have.
-pub fn checked(duration: Option<f64>) -> Result<Option<f64>> {
-    match duration {
-        Some(seconds) if !(seconds > 0.0 && seconds.is_finite()) => {
-            bail!("--duration {seconds}: it must be a positive number of seconds")
-        }
-        duration => Ok(duration),
-    }
 }
 
 /// Whether a file is the log of a session; one that cannot be read is not, and says so later.

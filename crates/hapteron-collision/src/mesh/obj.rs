@@ -6,6 +6,7 @@ use super::error::{MeshError, MeshProblem};
 use super::{Raw, polygon, text};
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Raw, MeshError> {
+    let bytes = &*text::with_line_feeds(bytes);
     let mut vertices: Vec<[f64; 3]> = Vec::new();
     let mut faces: Vec<(usize, Vec<i64>)> = Vec::new();
     let mut continued = String::new();

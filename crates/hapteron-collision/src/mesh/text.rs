@@ -7,6 +7,14 @@ pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, std::borrow::C
     bytes.split(|&b| b == b'\n').enumerate().map(|(i, line)| (i + 1, String::from_utf8_lossy(line)))
 }
 
+/// A file whose lines end as they did on old Macintoshes, with a carriage return alone, with line feeds in their place.
+pub(super) fn with_line_feeds(bytes: &[u8]) -> std::borrow::Cow<'_, [u8]> {
+    if bytes.contains(&b'\n') || !bytes.contains(&b'\r') {
+        return bytes.into();
+    }
+    bytes.iter().map(|&b| if b == b'\r' { b'\n' } else { b }).collect::<Vec<_>>().into()
+}
+
 /// All words of a file outside `#` comments, each with its line.
 pub(super) struct Words<'a> {
     rest: &'a [u8],
@@ -60,14 +68,35 @@ impl<'a> Words<'a> {
 
     /// The rest of the line that the last word is on.
     pub(super) fn skip_line(&mut self) {
-        let end = self.rest.iter().position(|&b| b == b'\n').unwrap_or(self.rest.len());
-        self.rest = &self.rest[end..];
+        self.rest = &self.rest[first_line(self.rest).len()..];
+    }
+
+    /// Words left in the line that the last word is on.
+    pub(super) fn left_in_line(&self) -> usize {
+        words_in(first_line(self.rest))
+    }
+
+    /// Words in the next line that has any.
+    pub(super) fn in_next_line(&self) -> usize {
+        let after = &self.rest[first_line(self.rest).len()..];
+        after.split(|&b| b == b'\n').map(words_in).find(|&count| count > 0).unwrap_or(0)
     }
 
     /// Bytes not yet read.
     pub(super) fn remaining(&self) -> usize {
         self.rest.len()
     }
+}
+
+fn first_line(bytes: &[u8]) -> &[u8] {
+    let end = bytes.iter().position(|&b| b == b'\n').unwrap_or(bytes.len());
+    &bytes[..end]
+}
+
+/// Words of a line before its comment.
+fn words_in(line: &[u8]) -> usize {
+    let end = line.iter().position(|&b| b == b'#').unwrap_or(line.len());
+    line[..end].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).count()
 }
 
 /// A number in a word.

@@ -5,7 +5,6 @@ mod soak;
 mod window;
 
 use crate::arguments::Bench;
-use crate::commands::run::checked;
 use crate::progress::{self, say};
 use crate::report::{self, distribution_json};
 use anyhow::{Result, bail};
@@ -29,13 +28,13 @@ const ROUNDS: usize = 31;
 
 /// Runs the command.
 pub fn bench(arguments: &Bench) -> Result<ExitCode> {
-    if let Some(seconds) = checked(arguments.soak)? {
+    if let Some(seconds) = arguments.soak {
         return soak::soak(seconds, arguments.json);
     }
     if arguments.window {
         return window(arguments);
     }
-    let Some(seconds) = checked(Some(arguments.seconds))? else { bail!("--seconds is missing") };
+    let seconds = arguments.seconds;
     progress::catch_interrupt();
     let scene = Arc::new(Scene::from_file(scenes::demo())?);
     say!("step times ...");
@@ -93,7 +92,7 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode> {
 /// Whether an open window makes ticks later.
 #[cfg(feature = "window")]
 fn window(arguments: &Bench) -> Result<ExitCode> {
-    window::window(checked(Some(arguments.seconds))?.unwrap_or_default(), arguments.json)
+    window::window(arguments.seconds, arguments.json)
 }
 
 /// Whether an open window makes ticks later.
