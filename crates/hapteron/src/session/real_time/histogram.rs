@@ -2,11 +2,11 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bins in each factor of two: values are known to 1 part in 32.
-const PER_OCTAVE: usize = 32;
+/// Bins in each factor of two: values are known to 1 part in 256, so that a period of 1000 us does not read as one of 1016.
+const PER_OCTAVE: usize = 256;
 const OCTAVE_BITS: u32 = PER_OCTAVE.trailing_zeros();
-/// From 2^5 to 2^37 ns (137 s); below, every nanosecond has a bin of its own, above is the last bin.
-const OCTAVES: usize = 32;
+/// From 2^8 to 2^37 ns (137 s); below, every nanosecond has a bin of its own, above is the last bin.
+const OCTAVES: usize = 29;
 const BINS: usize = PER_OCTAVE * (OCTAVES + 1);
 
 /// The bin of a duration.
@@ -98,7 +98,7 @@ pub struct Distribution {
 }
 
 impl Distribution {
-    /// The duration that a share (0 to 1) of all do not exceed, to 1 part in 32, nanoseconds; zero when there are none.
+    /// The duration that a share (0 to 1) of all do not exceed, to 1 part in 256, nanoseconds; zero when there are none.
     #[must_use]
     pub fn quantile_ns(&self, share: f64) -> u64 {
         let wanted = (share * self.count as f64).ceil().max(1.0) as u64;
@@ -151,12 +151,12 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Would catch bins that overlap, leave gaps or are wider than 1 part in 32.
+        /// Would catch bins that overlap, leave gaps or are wider than 1 part in 256.
         #[test]
         fn every_duration_is_in_the_bin_around_it(ns in 0u64..1 << 37) {
             let i = bin(ns);
             prop_assert!(floor_of(i) <= ns && ns < floor_of(i + 1));
-            prop_assert!((floor_of(i + 1) - floor_of(i)) * 32 <= floor_of(i).max(32));
+            prop_assert!((floor_of(i + 1) - floor_of(i)) * 256 <= floor_of(i).max(256));
         }
 
         /// Would catch a quantile that is off by a bin: against sorting.
@@ -169,7 +169,7 @@ mod tests {
             all.sort_unstable();
             let exact = all[((share * all.len() as f64).ceil().max(1.0) as usize - 1).min(all.len() - 1)];
             let found = histogram.distribution().quantile_ns(share);
-            prop_assert!(found >= exact && found - exact <= exact / 32 + 1, "{found} {exact}");
+            prop_assert!(found >= exact && found - exact <= exact / 256 + 1, "{found} {exact}");
         }
     }
 
