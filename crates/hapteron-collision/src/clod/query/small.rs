@@ -24,8 +24,9 @@ const SMOOTHING: f64 = 0.1;
 /// A front that is not ready after so many queries is left alone for so many: the surfaces move too quickly for it.
 const PATIENCE: u32 = 200;
 const REST: u32 = 2000;
-/// Searches through the tree that a query may spend on making each front ready: so many, and one a contact.
+/// Searches through the tree that a query may spend on making each front ready: so many, and one a contact up to so many.
 const SEARCHES: usize = 32;
+const MOST_SEARCHES: usize = 4096;
 
 /// How far the surfaces move from query to query, as a share of the tolerance, smoothed.
 #[derive(Clone, Copy, Debug)]
@@ -109,7 +110,7 @@ impl Seen {
 
     /// Searches that a query may spend on the fronts.
     pub(super) fn searches(&self) -> usize {
-        SEARCHES + self.contacts
+        SEARCHES + self.contacts.min(MOST_SEARCHES)
     }
 }
 
