@@ -2,7 +2,7 @@
 
 use super::Flags;
 use super::command::ContactLaw;
-use super::thinning::{Candidate, thin};
+use super::thinning::{Candidate, Thinning};
 use crate::scene::{ContactModel, Scene, handle_at};
 use hapteron_collision::clod::{LodWorkspace, query_levels};
 use hapteron_collision::cluster::{ClusterParameters, Clusterer};
@@ -189,6 +189,7 @@ pub struct ContactPass {
     clusterer: Option<Clusterer>,
     contacts: Vec<Contact>,
     candidates: Vec<Candidate>,
+    thinning: Thinning,
 }
 
 impl ContactPass {
@@ -204,6 +205,7 @@ impl ContactPass {
             clusterer: (settings.max_clusters > 0).then(|| Clusterer::new(parameters)),
             contacts: Vec::new(),
             candidates: Vec::new(),
+            thinning: Thinning::default(),
         }
     }
 
@@ -293,7 +295,8 @@ impl ContactPass {
         for c in self.contacts.iter().filter(alone) {
             add(&c.point_body, &c.point_obstacle, c.normal, c.depth, c.weight);
         }
-        let thinned = thin(&mut self.candidates, scene.model.surface.radius(), MAX_PLANES);
+        let radius = scene.model.surface.radius();
+        let thinned = self.thinning.thin(&mut self.candidates, radius, MAX_PLANES);
         snapshot.fill(&self.candidates, thinned, &view.body, state, view.model);
         self.contacts.iter().filter(|c| c.depth <= -d).count() as u32
     }
