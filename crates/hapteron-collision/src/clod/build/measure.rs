@@ -154,7 +154,10 @@ fn support_area(level: &Level, around: &Around, vertex: usize, depth: f64) -> f6
         area += dot(face_area(face), normal).max(0.0);
         for v in level.faces[face as usize] {
             for &g in around.of(v as usize) {
-                if seen.len() < 2 * SUPPORT_FACES && !seen.contains(&g) && is_near(g) {
+                if seen.len() >= 2 * SUPPORT_FACES {
+                    break;
+                }
+                if !seen.contains(&g) && is_near(g) {
                     seen.push(g);
                 }
             }

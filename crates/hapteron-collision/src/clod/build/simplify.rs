@@ -135,7 +135,7 @@ impl Simplifier<'_> {
                 self.emit();
             }
         }
-        if 10 * self.work.live <= 9 * last_live {
+        if self.work.live > 0 && 10 * self.work.live <= 9 * last_live {
             self.emit();
         }
         Ok(())
