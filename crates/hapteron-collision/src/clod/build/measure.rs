@@ -4,6 +4,7 @@ use super::simplify::Level;
 use crate::clod::nearest::{NOWHERE, Nearest, distance_to_hull, distance_to_triangle, search, slack};
 use crate::surface::Surface;
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or_zero};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A deviation is known to within this factor ...
 const CLOSENESS: f64 = 1.05;
@@ -17,17 +18,21 @@ const SUPPORT_DEPTH: f64 = 0.01;
 const SUPPORT_FACES: usize = 256;
 
 /// Upper bound, within [`CLOSENESS`], of the greatest distance of the original faces to the surface of their level, and of
-/// the patch's faces to the original surface.
+/// the patch's faces to the original surface; of no meaning when it was stopped.
 pub(super) fn deviation(
     surface: &Surface,
     originals: &[u32],
     level: &Level,
     level_surface: &Surface,
     patch: [u32; 2],
+    stop: &AtomicBool,
 ) -> f64 {
     let mut search = Search { nearest: Nearest::default(), leaf: NOWHERE, most: 0.0, stack: Vec::new() };
     let tolerance = FINEST * surface.radius;
     for &t in originals {
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
         search.look(level_surface, corners(&surface.vertices, &surface.triangles[t as usize]), tolerance);
     }
     search.leaf = NOWHERE;
