@@ -42,14 +42,14 @@ pub(super) fn freeze(
     tree: &Tree,
     progress: &mut Progress<'_>,
 ) -> Result<Hierarchy, BuildError> {
-    let supports: Vec<Vec<f64>> = levels.iter().map(|level| measure::support_areas(level, radius)).collect();
+    let supports = support_areas(levels, radius, progress)?;
     let surfaces: Vec<Surface> = levels.par_iter().map(Level::surface).collect();
     let coarse = Coarse { levels, surfaces: &surfaces, supports: &supports };
-    tell(progress, 0.7)?;
+    tell(progress, 0.8)?;
     let weights: Vec<usize> = tree.branches.iter().map(|b| weight(&coarse, b)).collect();
     let measure =
         |b: usize, stop: &AtomicBool| measure_branch(surface, &coarse, tree, &tree.branches[b], stop);
-    let mut measured = in_portions(&weights, measure, [0.7, 0.93], progress)?;
+    let mut measured = in_portions(&weights, measure, [0.8, 0.93], progress)?;
     let margins = complete(surface, tree, &mut measured, progress)?;
     let samples = samples::samples(surface, levels, tree);
     let mut result = Hierarchy {
@@ -93,6 +93,23 @@ pub(super) fn freeze(
     }
     result.middles = middles(surface, &result.nodes, &result.vertices);
     Ok(result)
+}
+
+/// By level the support areas at its vertices.
+fn support_areas(
+    levels: &[Level],
+    radius: f64,
+    progress: &mut Progress<'_>,
+) -> Result<Vec<Vec<f64>>, BuildError> {
+    let all = levels.iter().map(|level| level.vertices.len()).sum::<usize>().max(1) as f64;
+    let mut done = 0;
+    let share = |done: usize| 0.7 + 0.1 * done as f64 / all;
+    let of_level = |level: &Level| {
+        let begin = done;
+        done += level.vertices.len();
+        measure::support_areas(level, radius, [share(begin), share(done)], progress)
+    };
+    levels.iter().map(of_level).collect()
 }
 
 /// About how long a branch takes to be measured: as long as there are triangles whose deviation is looked for.

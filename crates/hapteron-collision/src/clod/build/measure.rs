@@ -1,6 +1,8 @@
 //! What a node knows of its patch and of the original surface that it stands for, measured.
 
+use super::portions::in_portions;
 use super::simplify::Level;
+use super::{BuildError, Progress};
 use crate::clod::nearest::{NOWHERE, Nearest, distance_to_hull, distance_to_triangle, search, slack};
 use crate::surface::Surface;
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or_zero};
@@ -98,11 +100,16 @@ pub(super) fn outside(points: &[Vec3], hull: &[Vec3], tolerance: f64) -> f64 {
 
 /// By vertex of a level: the area, projected onto its tangent plane, of the connected faces around it that stay within
 /// a fixed depth of that plane.
-pub(super) fn support_areas(level: &Level, radius: f64) -> Vec<f64> {
-    use rayon::prelude::*;
+pub(super) fn support_areas(
+    level: &Level,
+    radius: f64,
+    shares: [f64; 2],
+    progress: &mut Progress<'_>,
+) -> Result<Vec<f64>, BuildError> {
     let around = around(level);
     let depth = SUPPORT_DEPTH * radius;
-    (0..level.vertices.len()).into_par_iter().map(|v| support_area(level, &around, v, depth)).collect()
+    let area = |v: usize, _: &AtomicBool| support_area(level, &around, v, depth);
+    in_portions(&vec![1; level.vertices.len()], area, shares, progress)
 }
 
 /// By vertex the faces around it, as ranges of one list.
