@@ -20,7 +20,7 @@ pub fn run(arguments: &Run) -> Result<ExitCode> {
     // A log is no trajectory: it has the device's samples, the contact schedule and the commands of a session.
     let trajectory = if log.is_some() { None } else { arguments.replay.clone() };
     let changes = Changes { overrides: arguments.overrides.clone(), replay: trajectory };
-    let scene = Scene::load(&arguments.scene, &changes)?;
+    let scene = load(&arguments.scene, &changes)?;
     let duration = arguments.duration;
     let default =
         arguments.scene.file_stem().map_or_else(|| "run".into(), |s| s.to_string_lossy().into_owned());
@@ -51,6 +51,17 @@ pub fn run(arguments: &Run) -> Result<ExitCode> {
     real_time::run_into(scene, &plan, &folder)
 }
 
+/// Reads a scene, with a progress bar where contact levels have to be built.
+pub fn load(path: &Path, changes: &Changes) -> Result<Scene> {
+    let bar = progress::bar(1000, "contact levels");
+    let scene = Scene::load_with(path, changes, &mut |share| {
+        progress::catch_interrupt();
+        bar.set_position((share * 1000.0) as u64);
+        !progress::interrupted()
+    });
+    bar.finish_and_clear();
+    Ok(scene?)
+}
 /// Whether a file is the log of a session; one that cannot be read is not, and says so later.
 fn is_log(path: &Path) -> bool {
     let mut start = [0; 256];

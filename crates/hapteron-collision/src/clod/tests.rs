@@ -273,6 +273,33 @@ fn faulty_meshes_get_a_hierarchy_and_a_report() {
     }
 }
 
+/// A bar of so many sides with a fan of triangles at each end.
+fn turned(sides: u32, radius: f64) -> Surface {
+    let mut vertices = vec![[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]];
+    let mut triangles = Vec::new();
+    for k in 0..sides {
+        let angle = core::f64::consts::TAU * f64::from(k) / f64::from(sides);
+        let (x, y) = (radius * angle.cos(), radius * angle.sin());
+        vertices.extend([[x, y, -1.0], [x, y, 1.0]]);
+        let [a, b] = [k, (k + 1) % sides].map(|k| 2 + 2 * k);
+        triangles.extend([[0, b, a], [1, a + 1, b + 1], [a, b, b + 1], [a, b + 1, a + 1]]);
+    }
+    Surface::of_triangles(&vertices, &triangles)
+}
+
+/// Would catch turned parts, whose ends are fans, that get no levels or are taken for faulty.
+#[test]
+fn fans_are_no_hindrance() {
+    for radius in [0.01, 1.0] {
+        let surface = turned(100, radius);
+        assert_eq!(Hierarchy::defects(&surface), []);
+        let hierarchy = build(&surface);
+        assert!(hierarchy.levels >= 2, "{}", hierarchy.levels);
+        levels_cover("turned", &surface, &hierarchy);
+        deviations_hold("turned", &surface, &hierarchy);
+    }
+}
+
 /// Would catch a soup of single triangles, or one triangle, that has no tree.
 #[test]
 fn tiny_and_scattered_meshes() {

@@ -17,7 +17,7 @@ use crate::session::grasp::Buttons;
 use crate::trajectory::Trajectory;
 use error::Source;
 use hapteron_collision::Surface;
-use hapteron_collision::clod::{Detail, Hierarchy, Lod};
+use hapteron_collision::clod::{Detail, Hierarchy, Lod, Progress};
 use hapteron_collision::mesh::TriMesh;
 use hapteron_device::drivers::{self, DriverOptions};
 use hapteron_device::guard::{Guard, GuardSettings};
@@ -135,6 +135,19 @@ impl Scene {
     /// # Errors
     /// Whatever is wrong, with file, line, key and cure.
     pub fn load(path: impl AsRef<Path>, changes: &Changes) -> Result<Self, SceneError> {
+        Self::load_with(path, changes, &mut |_| true)
+    }
+
+    /// As [`Scene::load`]; where contact levels have to be built, which takes up to minutes, `progress` is told the share of each model's that is done
+    /// (0 to 1), and stops it all by answering `false`.
+    ///
+    /// # Errors
+    /// As [`Scene::load`], and when it was stopped.
+    pub fn load_with(
+        path: impl AsRef<Path>,
+        changes: &Changes,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, SceneError> {
         let path = path.as_ref();
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|e| SceneError {
@@ -144,7 +157,7 @@ impl Scene {
             problem: format!("cannot read the scene: {e}"),
         })?;
         let folder = path.parent().unwrap_or_else(|| Path::new("."));
-        Self::parse(&text, &name, folder, changes)
+        Self::parse_with(&text, &name, folder, changes, progress)
     }
 
     /// Reads a scene from text; `name` stands for the file in errors, and paths are relative to `folder`.
@@ -152,13 +165,23 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn parse(text: &str, name: &str, folder: &Path, changes: &Changes) -> Result<Self, SceneError> {
+        Self::parse_with(text, name, folder, changes, &mut |_| true)
+    }
+
+    fn parse_with(
+        text: &str,
+        name: &str,
+        folder: &Path,
+        changes: &Changes,
+        progress: &mut Progress<'_>,
+    ) -> Result<Self, SceneError> {
         let source = Source { name: name.to_owned(), text: text.to_owned() };
         let mut file = read::read(&source, &changes.overrides)?;
         if let Some(replay) = &changes.replay {
             let path = std::path::absolute(replay).unwrap_or_else(|_| replay.clone());
             file.hand = file::Hand { trajectory: Some(path.display().to_string()), ..Default::default() };
         }
-        resolve::resolve(&source, file, folder)
+        resolve::resolve(&source, file, folder, progress)
     }
 
     /// Completes a scene that is not read from a file; paths are relative to the current folder.
@@ -167,7 +190,7 @@ impl Scene {
     /// As [`Scene::load`].
     pub fn from_file(file: SceneFile) -> Result<Self, SceneError> {
         let name = file.scene.name.clone().unwrap_or_else(|| "scene".to_owned());
-        resolve::resolve(&Source { name, text: String::new() }, file, Path::new("."))
+        resolve::resolve(&Source { name, text: String::new() }, file, Path::new("."), &mut |_| true)
     }
 
     /// The scene with every value written out.

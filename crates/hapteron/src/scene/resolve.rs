@@ -9,7 +9,7 @@ use crate::session::real_time::HAPTIC_PRIORITY;
 use crate::trajectory::{PoseRow, Trajectory};
 use crate::{assets, motion};
 use hapteron_collision::Surface;
-use hapteron_collision::clod::{Detail, cache};
+use hapteron_collision::clod::{BuildError, Detail, Progress, cache};
 use hapteron_collision::mesh::{self, TriMesh};
 use hapteron_device::{DeviceSample, Scaling};
 use hapteron_dynamics::{Coupling, Method, RigidBody, Spring, State};
@@ -29,7 +29,12 @@ const EXACT_UNIT: f64 = 1e-14;
 
 pub(super) type Resolved<T> = Result<T, SceneError>;
 
-pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Resolved<Scene> {
+pub(super) fn resolve(
+    source: &Source,
+    mut file: SceneFile,
+    folder: &Path,
+    progress: &mut Progress<'_>,
+) -> Resolved<Scene> {
     let resolver = Resolver { source, folder };
     let time_step = resolver.interval("integrator.time_step", &mut file.integrator.time_step, 1e-3)?;
     let method = *file.integrator.method.get_or_insert(file::Method::BackwardEuler);
@@ -52,7 +57,10 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
     let contact = resolver.contact(&mut file, &body, &model, time_step)?;
     if !contact.detail.is_exact() {
         let models = std::iter::once(&mut model).chain(obstacles.iter_mut().map(|o| &mut o.model));
-        models.for_each(add_levels);
+        for model in models {
+            add_levels(model, progress)
+                .map_err(|error| source.fault("contact.error_threshold", error.to_string()))?;
+        }
     }
     Ok(Scene {
         file,
@@ -82,11 +90,11 @@ pub(super) fn resolve(source: &Source, mut file: SceneFile, folder: &Path) -> Re
 }
 
 /// Levels of detail from the user's cache, or else built and put there.
-fn add_levels(model: &mut Model) {
+fn add_levels(model: &mut Model, progress: &mut Progress<'_>) -> Result<(), BuildError> {
     let folder = cache::default_folder();
-    // Cannot be cancelled, so it cannot fail.
-    let found = cache::load_or_build(&model.surface, folder.as_deref(), &mut |_| true);
-    model.hierarchy = found.ok().map(|(hierarchy, _)| Arc::new(hierarchy));
+    let (hierarchy, _) = cache::load_or_build(&model.surface, folder.as_deref(), progress)?;
+    model.hierarchy = Some(Arc::new(hierarchy));
+    Ok(())
 }
 
 pub(super) struct Resolver<'a> {

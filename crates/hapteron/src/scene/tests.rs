@@ -191,3 +191,23 @@ fn buttons_and_priorities_are_checked() {
     assert_eq!(parse(&scene.to_toml().unwrap()).unwrap().file, scene.file);
     assert!(parse(&driven.replace("haply", "simulated")).unwrap_err().to_string().contains("needs a motion"));
 }
+
+/// Would catch contact levels that are built without a word, or that cannot be stopped: of a spoon whose size no cache knows.
+#[test]
+fn building_contact_levels_is_told_and_can_be_stopped() {
+    let size = 1.0 + 1e-9 * f64::from(std::process::id());
+    let text =
+        with("contact/error_threshold = 0.025").replace("[body]\n", &format!("[body]\nscale = {size}\n"));
+    let path = std::env::temp_dir().join(format!("hapteron-levels-{}.toml", std::process::id()));
+    std::fs::write(&path, &text).unwrap();
+    let mut told = Vec::new();
+    let stopped = Scene::load_with(&path, &Changes::default(), &mut |share| {
+        told.push(share);
+        told.len() < 3
+    });
+    std::fs::remove_file(path).unwrap();
+    let error = stopped.unwrap_err().to_string();
+    assert!(error.contains("cancelled") && error.contains("contact.error_threshold"), "{error}");
+    assert_eq!(told.len(), 3);
+    assert!(told.iter().all(|share| (0.0..1.0).contains(share)), "{told:?}");
+}

@@ -8,7 +8,7 @@ pub use axis::Axis;
 pub use judge::{Outcome, Verdict};
 
 use crate::arguments::Stability;
-use crate::commands::run::free_folder;
+use crate::commands::run::{free_folder, load};
 use crate::progress::{self, say};
 use crate::report;
 use anyhow::{Context, Result, bail};
@@ -66,7 +66,8 @@ fn common_overrides(arguments: &Stability, axes: &[Axis; 2]) -> Result<Vec<Strin
     if axes.iter().any(|a| hand(&a.key)) || common.iter().any(|o| hand(o)) {
         return Ok(common);
     }
-    let scene = Scene::load(&arguments.scene, &Changes { overrides: common.clone(), replay: None })?;
+    // The cells find the contact levels in the cache then, where there are any.
+    let scene = load(&arguments.scene, &Changes { overrides: common.clone(), replay: None })?;
     if scene.hand.is_none() {
         say!("note: the scene has no hand; it is held with a medium grip ({USUAL_GRIP})");
         common.push(USUAL_GRIP.to_owned());
@@ -88,7 +89,8 @@ fn run_cells(arguments: &Stability, axes: &[Axis; 2], common: &[String]) -> Resu
             let set = |axis: &Axis, value: usize| format!("{}={}", axis.key, axis.values[value]);
             let mut overrides = common.to_vec();
             overrides.extend([set(&axes[0], i % columns), set(&axes[1], i / columns)]);
-            let scene = Scene::load(&arguments.scene, &Changes { overrides, replay: None })?;
+            let changes = Changes { overrides, replay: None };
+            let scene = Scene::load_with(&arguments.scene, &changes, &mut |_| !progress::interrupted())?;
             let outcome = judge::judge(&scene)?;
             bar.inc(1);
             Ok(outcome)

@@ -17,6 +17,9 @@ const TURN: f64 = 0.2;
 /// No new face may be a worse needle than this unless it was worse before.
 const NEEDLE: f64 = 0.05;
 
+/// Edges at ends with more faces than this wait until there are fewer: each would take as long as a thousand others.
+const MOST_AROUND: usize = 1024;
+
 /// An edge with its surroundings.
 struct Site<'a> {
     work: &'a Work,
@@ -36,6 +39,9 @@ struct Site<'a> {
 /// Where the joined vertex of an edge may go; none when the edge is blocked.
 pub(super) fn place(work: &Work, ends: [u32; 2]) -> Option<Vec3> {
     let [u, v] = ends;
+    if ends.iter().any(|&end| work.around[end as usize].len() > MOST_AROUND) {
+        return None;
+    }
     let shared: Vec<u32> = common(&work.around[u as usize], &work.around[v as usize]);
     let fixed = allowed(work, ends, &shared)?;
     let mut moved: Vec<u32> = work.around[u as usize].clone();

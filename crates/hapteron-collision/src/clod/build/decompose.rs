@@ -5,6 +5,7 @@
 //! patch has no more than [`MOST_FACES`] faces, so that convexity is tested directly, every vertex against every face.
 
 use super::convex::{CONVEX_SLACK, all_below, height};
+use super::{BuildError, Progress, tell};
 use crate::surface::{EdgeKind, Surface};
 use crate::vector::Vec3;
 use std::cmp::Reverse;
@@ -12,6 +13,8 @@ use std::collections::{BinaryHeap, VecDeque};
 
 /// Most faces of a patch, at every level.
 pub(super) const MOST_FACES: usize = 48;
+/// Faces between two words to the progress callback.
+const PORTION: usize = 8192;
 /// No patch.
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -22,7 +25,7 @@ pub(super) struct Decomposition {
 }
 
 /// Cuts the surface into convex patches.
-pub(super) fn decompose(surface: &Surface) -> Decomposition {
+pub(super) fn decompose(surface: &Surface, progress: &mut Progress<'_>) -> Result<Decomposition, BuildError> {
     let count = surface.triangles.len();
     let grower = Grower { surface, slack: CONVEX_SLACK * surface.radius };
     let convex = convex_edges(surface, grower.slack);
@@ -31,12 +34,15 @@ pub(super) fn decompose(surface: &Surface) -> Decomposition {
     seeds.sort_by_key(|&f| (Reverse(rank[f as usize]), f));
     let mut result = Decomposition { patch_of: vec![NONE; count], patches: Vec::new() };
     let mut failed = vec![NONE; count];
-    for seed in seeds {
+    for (done, seed) in seeds.into_iter().enumerate() {
+        if done % PORTION == PORTION - 1 {
+            tell(progress, 0.1 * done as f64 / count as f64)?;
+        }
         if result.patch_of[seed as usize] == NONE {
             grower.grow(seed, &convex, &rank, &mut failed, &mut result);
         }
     }
-    result
+    Ok(result)
 }
 
 /// A face that may be taken in next: those farthest from concavity first, and of those the ones closest to the seed, so that

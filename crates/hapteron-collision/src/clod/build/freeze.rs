@@ -2,6 +2,7 @@
 
 use super::convex::CONVEX_SLACK;
 use super::measure;
+use super::portions::in_portions;
 use super::samples;
 use super::simplify::Level;
 use super::tree::{Branch, Tree};
@@ -11,11 +12,10 @@ use crate::clod::{Hierarchy, Node, PURE_HULL, range};
 use crate::surface::Surface;
 use crate::vector::{Vec3, add, cross, dot, sub, unit_or_zero};
 use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
 
 /// A mere hull has no more vertices than this; the margin makes up for what it leaves out.
 const HULL_VERTICES: usize = 64;
-/// Branches measured between two words to the progress callback.
-const PORTION: usize = 4096;
 
 /// The levels with what is measured of each as a whole.
 struct Coarse<'a> {
@@ -42,15 +42,15 @@ pub(super) fn freeze(
     tree: &Tree,
     progress: &mut Progress<'_>,
 ) -> Result<Hierarchy, BuildError> {
-    let supports: Vec<Vec<f64>> = levels.iter().map(|level| measure::support_areas(level, radius)).collect();
+    let supports = support_areas(levels, radius, progress)?;
     let surfaces: Vec<Surface> = levels.par_iter().map(Level::surface).collect();
     let coarse = Coarse { levels, surfaces: &surfaces, supports: &supports };
-    let mut measured: Vec<Measured> = Vec::with_capacity(tree.branches.len());
-    for portion in tree.branches.chunks(PORTION) {
-        measured.par_extend(portion.par_iter().map(|b| measure_branch(surface, &coarse, tree, b)));
-        tell(progress, 0.7 + 0.25 * measured.len() as f64 / tree.branches.len() as f64)?;
-    }
-    let margins = complete(surface, tree, &mut measured);
+    tell(progress, 0.8)?;
+    let weights: Vec<usize> = tree.branches.iter().map(|b| weight(&coarse, b)).collect();
+    let measure =
+        |b: usize, stop: &AtomicBool| measure_branch(surface, &coarse, tree, &tree.branches[b], stop);
+    let mut measured = in_portions(&weights, measure, [0.8, 0.93], progress)?;
+    let margins = complete(surface, tree, &mut measured, progress)?;
     let samples = samples::samples(surface, levels, tree);
     let mut result = Hierarchy {
         nodes: Vec::with_capacity(tree.branches.len()),
@@ -95,7 +95,42 @@ pub(super) fn freeze(
     Ok(result)
 }
 
-fn measure_branch(surface: &Surface, coarse: &Coarse<'_>, tree: &Tree, branch: &Branch) -> Measured {
+/// By level the support areas at its vertices.
+fn support_areas(
+    levels: &[Level],
+    radius: f64,
+    progress: &mut Progress<'_>,
+) -> Result<Vec<Vec<f64>>, BuildError> {
+    let all = levels.iter().map(|level| level.vertices.len()).sum::<usize>().max(1) as f64;
+    let mut done = 0;
+    let share = |done: usize| 0.7 + 0.1 * done as f64 / all;
+    let of_level = |level: &Level| {
+        let begin = done;
+        done += level.vertices.len();
+        measure::support_areas(level, radius, [share(begin), share(done)], progress)
+    };
+    levels.iter().map(of_level).collect()
+}
+
+/// About how long a branch takes to be measured: as long as there are triangles whose deviation is looked for.
+fn weight(coarse: &Coarse<'_>, branch: &Branch) -> usize {
+    let originals = (branch.triangles[1] - branch.triangles[0]) as usize;
+    match branch.patch {
+        None | Some((0, _)) => 1 + originals / 100,
+        Some((level, patch)) => {
+            let [begin, end] = coarse.levels[level as usize].patches[patch as usize].faces;
+            1 + originals + (end - begin) as usize
+        }
+    }
+}
+
+fn measure_branch(
+    surface: &Surface,
+    coarse: &Coarse<'_>,
+    tree: &Tree,
+    branch: &Branch,
+    stop: &AtomicBool,
+) -> Measured {
     let originals = &tree.triangles[range(branch.triangles)];
     let corners = originals.iter().flat_map(|&t| surface.triangles[t as usize]);
     let points = corners.map(|v| surface.vertices[v as usize]);
@@ -130,7 +165,7 @@ fn measure_branch(surface: &Surface, coarse: &Coarse<'_>, tree: &Tree, branch: &
     result.deviation = if number == 0 {
         0.0
     } else {
-        measure::deviation(surface, originals, level, &coarse.surfaces[number as usize], patch.faces)
+        measure::deviation(surface, originals, level, &coarse.surfaces[number as usize], patch.faces, stop)
     };
     result
 }
@@ -150,7 +185,12 @@ fn slab(surface: &Surface, originals: &[u32], points: impl Iterator<Item = Vec3>
 
 /// From the leaves up, the hulls of what has no patch, and the margins: a hull whose vertices lie within e of another lies
 /// within e of it altogether, so margins add up from child to parent.
-fn complete(surface: &Surface, tree: &Tree, measured: &mut [Measured]) -> Vec<f64> {
+fn complete(
+    surface: &Surface,
+    tree: &Tree,
+    measured: &mut [Measured],
+    progress: &mut Progress<'_>,
+) -> Result<Vec<f64>, BuildError> {
     let tolerance = CONVEX_SLACK * surface.radius;
     for index in (0..tree.branches.len()).rev() {
         let children = range(tree.branches[index].children);
@@ -161,20 +201,20 @@ fn complete(surface: &Surface, tree: &Tree, measured: &mut [Measured]) -> Vec<f6
             measured[index].hull = extremes(points);
         }
     }
-    let step: Vec<f64> = (0..tree.branches.len())
-        .into_par_iter()
-        .map(|index| {
-            let parent = &measured[tree.branches[index].parent as usize];
-            measure::outside(&measured[index].hull, &parent.hull, tolerance)
-        })
-        .collect();
+    let parent = |index: usize| &measured[tree.branches[index].parent as usize];
+    let weights: Vec<usize> =
+        (0..measured.len()).map(|i| measured[i].hull.len() * parent(i).hull.len()).collect();
+    let outside = |index: usize, _: &AtomicBool| {
+        measure::outside(&measured[index].hull, &parent(index).hull, tolerance)
+    };
+    let step = in_portions(&weights, outside, [0.93, 0.97], progress)?;
     let mut margins = vec![0.0; tree.branches.len()];
     for index in (1..tree.branches.len()).rev() {
         let parent = tree.branches[index].parent as usize;
         let needed: f64 = margins[index] + step[index];
         margins[parent] = needed.max(margins[parent]);
     }
-    margins
+    Ok(margins)
 }
 
 /// The points that are extreme in some direction out of a fixed set, spread evenly over the sphere.

@@ -1,9 +1,12 @@
 //! What a node knows of its patch and of the original surface that it stands for, measured.
 
+use super::portions::in_portions;
 use super::simplify::Level;
+use super::{BuildError, Progress};
 use crate::clod::nearest::{NOWHERE, Nearest, distance_to_hull, distance_to_triangle, search, slack};
 use crate::surface::Surface;
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or_zero};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A deviation is known to within this factor ...
 const CLOSENESS: f64 = 1.05;
@@ -17,17 +20,21 @@ const SUPPORT_DEPTH: f64 = 0.01;
 const SUPPORT_FACES: usize = 256;
 
 /// Upper bound, within [`CLOSENESS`], of the greatest distance of the original faces to the surface of their level, and of
-/// the patch's faces to the original surface.
+/// the patch's faces to the original surface; of no meaning when it was stopped.
 pub(super) fn deviation(
     surface: &Surface,
     originals: &[u32],
     level: &Level,
     level_surface: &Surface,
     patch: [u32; 2],
+    stop: &AtomicBool,
 ) -> f64 {
     let mut search = Search { nearest: Nearest::default(), leaf: NOWHERE, most: 0.0, stack: Vec::new() };
     let tolerance = FINEST * surface.radius;
     for &t in originals {
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
         search.look(level_surface, corners(&surface.vertices, &surface.triangles[t as usize]), tolerance);
     }
     search.leaf = NOWHERE;
@@ -93,11 +100,16 @@ pub(super) fn outside(points: &[Vec3], hull: &[Vec3], tolerance: f64) -> f64 {
 
 /// By vertex of a level: the area, projected onto its tangent plane, of the connected faces around it that stay within
 /// a fixed depth of that plane.
-pub(super) fn support_areas(level: &Level, radius: f64) -> Vec<f64> {
-    use rayon::prelude::*;
+pub(super) fn support_areas(
+    level: &Level,
+    radius: f64,
+    shares: [f64; 2],
+    progress: &mut Progress<'_>,
+) -> Result<Vec<f64>, BuildError> {
     let around = around(level);
     let depth = SUPPORT_DEPTH * radius;
-    (0..level.vertices.len()).into_par_iter().map(|v| support_area(level, &around, v, depth)).collect()
+    let area = |v: usize, _: &AtomicBool| support_area(level, &around, v, depth);
+    in_portions(&vec![1; level.vertices.len()], area, shares, progress)
 }
 
 /// By vertex the faces around it, as ranges of one list.
@@ -154,7 +166,10 @@ fn support_area(level: &Level, around: &Around, vertex: usize, depth: f64) -> f6
         area += dot(face_area(face), normal).max(0.0);
         for v in level.faces[face as usize] {
             for &g in around.of(v as usize) {
-                if seen.len() < 2 * SUPPORT_FACES && !seen.contains(&g) && is_near(g) {
+                if seen.len() >= 2 * SUPPORT_FACES {
+                    break;
+                }
+                if !seen.contains(&g) && is_near(g) {
                     seen.push(g);
                 }
             }

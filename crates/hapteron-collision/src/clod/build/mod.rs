@@ -6,6 +6,7 @@ mod decompose;
 mod freeze;
 mod measure;
 mod merge;
+mod portions;
 mod quadric;
 mod samples;
 mod simplify;
@@ -34,7 +35,7 @@ fn tell(progress: &mut Progress<'_>, share: f64) -> Result<(), BuildError> {
 
 pub(super) fn hierarchy(surface: &Surface, progress: &mut Progress<'_>) -> Result<Hierarchy, BuildError> {
     let slack = convex::CONVEX_SLACK * surface.radius;
-    let decomposition = decompose::decompose(surface);
+    let decomposition = decompose::decompose(surface, progress)?;
     tell(progress, 0.1)?;
     let (_, radius) = measure::sphere(surface.vertices.iter().copied());
     let work = Work::new(surface, decomposition, slack);

@@ -101,7 +101,7 @@ impl Simplifier<'_> {
 
     fn run(&mut self, progress: &mut Progress<'_>) -> Result<(), BuildError> {
         let all = self.work.position.len();
-        let mut collapsed = 0;
+        let (mut collapsed, mut looked) = (0, 0u32);
         let mut last_live = self.work.live;
         while let Some(Reverse((length, ends, stamps))) = self.queue.pop() {
             if f64::from_bits(length) > LONGEST_EDGE * self.radius {
@@ -112,6 +112,10 @@ impl Simplifier<'_> {
             {
                 continue;
             }
+            looked = looked.wrapping_add(1);
+            if looked % 1024 == 0 {
+                tell(progress, 0.1 + 0.6 * collapsed as f64 / all as f64)?;
+            }
             let Some(p) = place(&self.work, ends) else {
                 self.blocked.insert(ends);
                 continue;
@@ -121,9 +125,6 @@ impl Simplifier<'_> {
             self.reinsert(ends[0]);
             self.longest = self.longest.max(f64::from_bits(length));
             collapsed += 1;
-            if collapsed % 1024 == 0 {
-                tell(progress, 0.1 + 0.6 * collapsed as f64 / all as f64)?;
-            }
             if self.work.live < FEWEST_PATCHES {
                 break;
             }
@@ -135,7 +136,7 @@ impl Simplifier<'_> {
                 self.emit();
             }
         }
-        if 10 * self.work.live <= 9 * last_live {
+        if self.work.live > 0 && 10 * self.work.live <= 9 * last_live {
             self.emit();
         }
         Ok(())

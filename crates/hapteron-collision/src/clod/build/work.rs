@@ -4,9 +4,13 @@ use super::decompose::Decomposition;
 use super::quadric::Quadric;
 use crate::surface::{EdgeKind, Surface};
 use crate::vector::{Vec3, cross, dot, norm, sub, unit_or_zero};
+use std::collections::HashSet;
 
 /// Weight of a border's wall against the faces beside it.
 const BORDER_WEIGHT: f64 = 0.05;
+
+/// Of a vertex with more faces than this, the neighbours are told apart by a table: there are fans of thousands, the ends of turned parts.
+const MANY_FACES: usize = 32;
 
 /// How freely a vertex may move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,14 +130,18 @@ impl Work {
 
     /// The vertices next to one, each once, in the order of its faces.
     pub(super) fn ring(&self, vertex: u32) -> Vec<u32> {
-        let mut ring = Vec::with_capacity(8);
-        for &f in &self.around[vertex as usize] {
-            for v in self.faces[f as usize] {
-                if v != vertex && !ring.contains(&v) {
-                    ring.push(v);
-                }
-            }
+        let around = &self.around[vertex as usize];
+        let corners = around.iter().flat_map(|&f| self.faces[f as usize]).filter(|&v| v != vertex);
+        if around.len() > MANY_FACES {
+            let mut seen = HashSet::with_capacity(2 * around.len());
+            return corners.filter(|&v| seen.insert(v)).collect();
         }
+        let mut ring = Vec::with_capacity(8);
+        corners.for_each(|v| {
+            if !ring.contains(&v) {
+                ring.push(v);
+            }
+        });
         ring
     }
 
@@ -168,18 +176,45 @@ pub(super) fn faces_around(surface: &Surface) -> Vec<Vec<u32>> {
 
 /// Whether the faces around a vertex hang together by edges at it.
 pub(super) fn is_one_fan(vertex: u32, around: &[u32], faces: &[[u32; 3]]) -> bool {
-    let mut reached = vec![false; around.len()];
-    let mut stack = vec![0];
-    while let Some(i) = stack.pop() {
-        if around.is_empty() || std::mem::replace(&mut reached[i], true) {
-            continue;
-        }
-        for (j, &g) in around.iter().enumerate() {
-            let touches = |&v: &u32| v != vertex && faces[around[i] as usize].contains(&v);
-            if !reached[j] && faces[g as usize].iter().any(touches) {
-                stack.push(j);
-            }
-        }
+    // By neighbour the faces that share the edge to it.
+    let corners = |(i, &f): (usize, &u32)| faces[f as usize].map(|v| (v, i));
+    let mut spokes: Vec<(u32, usize)> = around.iter().enumerate().flat_map(corners).collect();
+    spokes.retain(|s| s.0 != vertex);
+    spokes.sort_unstable();
+    let mut part: Vec<usize> = (0..around.len()).collect();
+    let mut parts = around.len();
+    for pair in spokes.windows(2).filter(|p| p[0].0 == p[1].0) {
+        let [a, b] = [pair[0].1, pair[1].1].map(|i| first_of(&mut part, i));
+        parts -= usize::from(a != b);
+        part[a.max(b)] = a.min(b);
     }
-    reached.iter().all(|&r| r)
+    parts <= 1
+}
+
+/// The first face of the part that a face belongs to.
+fn first_of(part: &mut [usize], mut face: usize) -> usize {
+    while part[face] != face {
+        part[face] = part[part[face]];
+        face = part[face];
+    }
+    face
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Would catch time that grows with the square of the faces at a vertex (minutes for these), and fans that are taken for one or for several.
+    #[test]
+    fn large_fans_are_told_apart() {
+        let count = 100_000;
+        let closed: Vec<[u32; 3]> = (0..count).map(|k| [0, 1 + k, 1 + (k + 1) % count]).collect();
+        let around: Vec<u32> = (0..count).collect();
+        assert!(is_one_fan(0, &around, &closed));
+        // Without one face it is open but still one, without two that are apart it is two.
+        assert!(is_one_fan(0, &around[1..], &closed));
+        let torn: Vec<u32> = around.iter().copied().filter(|f| ![7, 5000].contains(f)).collect();
+        assert!(!is_one_fan(0, &torn, &closed));
+        assert!(is_one_fan(0, &[], &closed));
+    }
 }

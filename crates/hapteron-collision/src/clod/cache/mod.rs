@@ -12,6 +12,8 @@ use super::{Hierarchy, format_version};
 use crate::surface::Surface;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, SystemTime};
 
 pub use format::Refused;
 
@@ -99,14 +101,22 @@ fn key(surface: &Surface) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
-/// Writes a file so that at no time a part of it stands in its place.
+/// What was left beside a file by a writer that was killed is taken away when it is older than this.
+const LEFT_BEHIND: Duration = Duration::from_secs(3600);
+
+/// Writes a file so that at no time a part of it stands in its place, whoever else writes it at the same time.
 fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    static WRITES: AtomicU64 = AtomicU64::new(0);
     let folder = path.parent().unwrap_or_else(|| Path::new("."));
     std::fs::create_dir_all(folder)?;
+    sweep(path, folder);
+    // Of this process, and of this write among those of its threads. Two machines with one folder may have the same number.
+    let number = WRITES.fetch_add(1, Ordering::Relaxed);
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |t| t.subsec_nanos());
     let mut beside = path.as_os_str().to_owned();
-    beside.push(format!(".{}", std::process::id()));
+    beside.push(format!(".{}-{number}-{now}", std::process::id()));
     let beside = PathBuf::from(beside);
-    let written = std::fs::File::create(&beside).and_then(|mut file| {
+    let written = std::fs::File::create_new(&beside).and_then(|mut file| {
         file.write_all(bytes)?;
         file.sync_all()
     });
@@ -115,6 +125,17 @@ fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
         let _ = std::fs::remove_file(&beside);
     }
     moved
+}
+
+/// Takes away what killed writers of a file have left beside it.
+fn sweep(path: &Path, folder: &Path) {
+    let Some(name) = path.file_name().map(|n| format!("{}.", n.to_string_lossy())) else { return };
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let age = entry.metadata().and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok());
+        if entry.file_name().to_string_lossy().starts_with(&name) && age.is_some_and(|a| a > LEFT_BEHIND) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 #[cfg(test)]

@@ -71,8 +71,78 @@ fn contradictions_are_found_behind_a_good_checksum() {
     assert!(refused > body.len() / 4, "{refused} of {}", body.len());
 }
 
+/// Would catch levels that are promised and have no patches: to list four thousand million of them takes for ever.
+#[test]
+fn levels_without_patches_are_found() {
+    let triangle = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let one = Surface::of_triangles(&triangle, &[[0, 1, 2]]);
+    let none = Surface::of_triangles(&[], &[]);
+    for surface in [&one, &none, &surface(0.05)] {
+        let built = Hierarchy::build(surface, &mut |_| true).unwrap();
+        assert!(Hierarchy::from_bytes(&built.to_bytes(surface), surface).is_ok());
+        let more = Hierarchy { levels: u32::MAX, ..built };
+        let refused = Hierarchy::from_bytes(&more.to_bytes(surface), surface);
+        assert!(matches!(refused, Err(Refused::Impossible(_))), "{refused:?}");
+    }
+}
+
+/// Would catch a change of what is built, or of how it is written, without a new [`format_version`]: files of the old program would be
+/// taken for its own. With a new version, the digest here has to be the new one. One system is enough, and others may round otherwise.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_is_built_belongs_to_its_version() {
+    // Without a sine, which depends on the library.
+    let bump = |i: u32| (i % 8) * (8 - i % 8);
+    let height = |i: u32, j: u32| f64::from(bump(i) * bump(j)) / 2048.0;
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for (i, j) in (0..16).flat_map(|i| (0..16).map(move |j| (i, j))) {
+        vertices.push([f64::from(i) / 8.0, f64::from(j) / 8.0, height(i, j)]);
+        if i > 0 && j > 0 {
+            let [a, b, c, d] = [(i - 1) * 16 + j - 1, i * 16 + j - 1, i * 16 + j, (i - 1) * 16 + j];
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    let surface = Surface::of_triangles(&vertices, &triangles);
+    let digest = blake3::hash(&build(&surface).to_bytes(&surface)).to_hex();
+    assert_eq!((format_version(), &digest[..16]), (1, "8f184dd5594b30a6"));
+}
+
+/// Would catch threads that write one file at the same time and spoil it for each other: every one of them finds or makes it whole.
+#[test]
+fn many_can_write_at_the_same_time() {
+    let folder = std::env::temp_dir().join(format!("hapteron-cache-race-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    let surface = surface(0.05);
+    let path = file_in(&folder, &surface);
+    let bytes = build(&surface).to_bytes(&surface);
+    std::thread::scope(|scope| {
+        for _ in 0..8 {
+            scope.spawn(|| {
+                for _ in 0..50 {
+                    write_whole(&path, &bytes).unwrap();
+                    assert!(std::fs::read(&path).unwrap() == bytes, "a part of it");
+                }
+            });
+        }
+    });
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1);
+    // What a killed writer left goes with the next writing, what another one is writing stays, and so do other files.
+    let beside = |name: &str| folder.join(format!("{}.{name}", path.file_name().unwrap().to_string_lossy()));
+    let old = std::time::SystemTime::now() - 2 * LEFT_BEHIND;
+    for (place, time) in
+        [(beside("1-0-0"), Some(old)), (beside("2-0-0"), None), (folder.join("other"), Some(old))]
+    {
+        let file = std::fs::File::create(&place).unwrap();
+        time.map_or(Ok(()), |time| file.set_modified(time)).unwrap();
+    }
+    write_whole(&path, &bytes).unwrap();
+    assert!(!beside("1-0-0").exists() && beside("2-0-0").exists() && folder.join("other").exists());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
 fn walk(h: &Hierarchy, surface: &Surface) {
     use crate::clod::range;
+    assert_eq!(h.levels().len(), h.levels as usize);
     for node in &h.nodes {
         let _ = &h.nodes[range(node.children)];
         let hull = h.hull(node);

@@ -11,6 +11,9 @@ pub(super) fn validate(hierarchy: &Hierarchy, surface: &Surface) -> Result<(), &
     if h.nodes.is_empty() != surface.triangles.is_empty() {
         return Err("nodes");
     }
+    if h.nodes.is_empty() && h.levels > 1 {
+        return Err("levels");
+    }
     if !h.hull_vertices.iter().flatten().all(|c| c.is_finite()) {
         return Err("hull vertices");
     }
@@ -105,6 +108,10 @@ fn family(h: &Hierarchy, index: usize, node: &Node) -> Result<(), &'static str> 
         return Err("family");
     }
     let is_root = index == 0;
+    // Or else there were levels without nodes.
+    if is_root && node.level != PURE_HULL && node.level + 1 != h.levels {
+        return Err("levels");
+    }
     let whole =
         node.triangles == [0, h.triangles.len() as u32] && node.vertices == [0, h.vertices.len() as u32];
     if is_root && !(whole && node.parent == 0) { Err("root") } else { Ok(()) }

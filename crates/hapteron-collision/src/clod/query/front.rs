@@ -86,7 +86,7 @@ impl Front {
 
     /// The next walk chooses levels at once, without a change that takes time.
     pub(super) fn settle(&mut self) {
-        self.walk += 1;
+        self.walk = self.walk.wrapping_add(1);
         self.plan.until = f64::NEG_INFINITY;
     }
 
@@ -111,7 +111,7 @@ impl Front {
             return 1.0;
         }
         let moved = || norm(sub(search.motion.point(node.center), search.last.point(node.center)));
-        let lately = self.seen[i] + 1 == self.walk;
+        let lately = self.seen[i].wrapping_add(1) == self.walk;
         // What is new to the front begins on the fine side.
         let wanted = if judge.refines(node, moved, !lately || self.open[i] > 0.5) { 1.0 } else { 0.0 };
         // What was not near until now has no force yet and may change at once.
@@ -235,7 +235,8 @@ pub(super) fn find(
 /// Walks from the root to the front and plans which samples to look at.
 #[inline(always)]
 fn walk(front: &mut Front, hierarchy: &Hierarchy, search: &Search<'_>, judge: &Judge) -> Option<()> {
-    front.walk += 1;
+    // Around once in seven weeks; what is then taken for new changes its level a bit sooner.
+    front.walk = front.walk.wrapping_add(1);
     front.nodes.clear();
     front.plan.begin(judge, search);
     front.stack.clear();

@@ -22,7 +22,8 @@ pub struct Detail {
     pub view: Option<View>,
     /// With more than one metric.
     pub combine: Combine,
-    /// Microseconds that a query should take at most: where that is not enough the greatest errors are refined first.
+    /// Microseconds that a query should take at most: where that is not enough the greatest errors are refined first. It is kept by what the last
+    /// queries took, so some of the first are late (these are exact, until levels are ready), and some after the contact has grown.
     /// Makes results depend on the machine's speed.
     pub budget_us: Option<f64>,
 }

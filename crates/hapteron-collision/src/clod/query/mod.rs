@@ -6,6 +6,7 @@
 //! between samples, and a contact carries the number of vertices that it stands for, so that the total stiffness does not
 //! depend on the level.
 
+mod budget;
 mod emit;
 mod front;
 mod held;
@@ -24,6 +25,7 @@ use crate::contact::Contact;
 use crate::query::{QueryResult, QueryWorkspace, query};
 use crate::surface::Surface;
 use crate::vector::{Rigid, Vec3, scale};
+use budget::Leniency;
 use emit::Emit;
 use front::{Front, Tally, find};
 use least::Least;
@@ -32,11 +34,9 @@ use nalgebra::Isometry3;
 use side::Search;
 use small::{Pace, Seen, Warmth, Way};
 
-/// A query that takes longer than its budget makes the next ones this much more lenient, up to a limit.
-const LENIENT: f64 = 1.2;
-const MOST_LENIENT: f64 = 1e6;
-/// One that takes less than this share of it makes them stricter again.
-const SPARE: f64 = 0.6;
+/// Smaller and greater tolerances count as these, metres, as in the exact query.
+const LEAST_TOLERANCE: f64 = 1e-12;
+const GREATEST_TOLERANCE: f64 = 1e12;
 
 /// In contacts of more vertices than this nothing is looked for that is closer than the samples show: it would take several milliseconds every now and then.
 const LARGEST: f64 = 10_000.0;
@@ -78,7 +78,7 @@ pub struct LodWorkspace {
     tallies: [Tally; 2],
     contacts: Vec<Contact>,
     least: Least,
-    leniency: f64,
+    leniency: Leniency,
     way: Way,
     warmth: Warmth,
     pace: Pace,
@@ -101,7 +101,7 @@ impl LodWorkspace {
         Self::default()
     }
 
-    /// Samples of the fronts on body and obstacle in the last query.
+    /// Samples of the fronts on body and obstacle in the last query; none where it was exact.
     #[must_use]
     pub fn samples(&self) -> [usize; 2] {
         self.tallies.map(|t| t.samples)
@@ -121,13 +121,22 @@ impl LodWorkspace {
         [&self.fronts[0].nodes, &self.fronts[1].nodes]
     }
 
-    /// Begins anew when the surfaces are others than last time.
+    /// The last query had no fronts.
+    fn without_fronts(&mut self) {
+        self.tallies = [Tally::default(); 2];
+        self.fronts.iter_mut().for_each(|front| front.nodes.clear());
+    }
+
+    /// Begins anew when the surfaces are others than last time, or were far apart.
     fn prepare(&mut self, pair: &Pair<'_>) -> Option<State> {
         let identities = [pair.body.surface.identity, pair.obstacle.surface.identity];
         let known = self.state.filter(|s| s.identities == identities);
         let root = &pair.body.hierarchy.nodes[0];
-        let travelled =
-            known.map_or(0.0, |s| s.travelled + front::displacement(root, &s.motion, &pair.motion));
+        let travelled = known.map_or(0.0, |s| {
+            let step = front::displacement(root, &s.motion, &pair.motion);
+            // Rounded up, or a slow motion after a long way would not count.
+            if step > 0.0 { (s.travelled + step).next_up() } else { s.travelled }
+        });
         if let Some(known) = known {
             self.pace.observe((travelled - known.travelled) / pair.tolerance);
         }
@@ -138,7 +147,7 @@ impl LodWorkspace {
             }
             self.least.reset();
             self.closer.look_ahead(AHEAD * pair.tolerance);
-            self.leniency = 1.0;
+            self.leniency = Leniency::default();
             self.way = Way::default();
             self.warmth = Warmth::Cold;
             self.pace = Pace::default();
@@ -183,7 +192,8 @@ fn inverse(motion: &Rigid) -> Rigid {
 /// With an exact `detail` it is [`query()`]. Otherwise contacts stand for `weight` vertices each; the points, normals
 /// and depths are exact where they are. The least distance is no farther from the exact one than both surfaces' nodes are off at the place where they are closest;
 /// in contacts of more than 10,000 vertices it is that of a local minimum. Hierarchies that do not belong
-/// to their surfaces, poses and tolerances that are not finite, find nothing. Not for the haptic thread.
+/// to their surfaces, poses and tolerances that are not finite, and negative tolerances, find nothing; a tolerance of zero finds what crosses.
+/// Not for the haptic thread.
 pub fn query_levels<'a>(
     body: Lod<'_>,
     world_from_body: &Isometry3<f64>,
@@ -194,6 +204,7 @@ pub fn query_levels<'a>(
     workspace: &'a mut LodWorkspace,
 ) -> QueryResult<'a> {
     if detail.is_exact() {
+        workspace.without_fronts();
         let exact = &mut workspace.exact;
         return query(body.surface, world_from_body, obstacle.surface, world_from_obstacle, tolerance, exact);
     }
@@ -202,10 +213,16 @@ pub fn query_levels<'a>(
     let finite = |pose: &Isometry3<f64>| {
         pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|c| c.is_finite())
     };
-    let valid = tolerance > 0.0 && tolerance.is_finite() && finite(&relative) && finite(world_from_obstacle);
+    let valid = tolerance >= 0.0 && tolerance.is_finite() && finite(&relative) && finite(world_from_obstacle);
     let fits =
         [body, obstacle].iter().all(|l| l.hierarchy.belongs_to(l.surface) && !l.hierarchy.nodes.is_empty());
-    if !(valid && fits) {
+    let tolerance = tolerance.clamp(LEAST_TOLERANCE, GREATEST_TOLERANCE);
+    let near =
+        relative.translation.vector.amax() <= tolerance + body.surface.radius + obstacle.surface.radius;
+    if !(valid && fits && near) {
+        workspace.without_fronts();
+        // The way from far apart would be so long that short ones no longer show beside it.
+        workspace.state = workspace.state.filter(|_| near);
         return QueryResult { min_distance: f64::INFINITY, contacts: &workspace.contacts };
     }
     let started = detail.budget_us.map(|_| std::time::Instant::now());
@@ -225,12 +242,8 @@ pub fn query_levels<'a>(
         Way::Levels => workspace.find_by_levels(&scenery),
     };
     if let (Some(started), Some(budget)) = (started, detail.budget_us) {
-        let share = started.elapsed().as_secs_f64() * 1e6 / budget;
-        if share > 1.0 {
-            workspace.leniency = (workspace.leniency * LENIENT).min(MOST_LENIENT);
-        } else if share < SPARE {
-            workspace.leniency = (workspace.leniency / LENIENT).max(1.0);
-        }
+        let by_levels = workspace.tallies.iter().any(|t| t.samples > 0);
+        workspace.leniency.observe(started.elapsed().as_secs_f64() * 1e6 / budget, by_levels);
     }
     QueryResult { min_distance, contacts: &workspace.contacts }
 }
@@ -270,7 +283,7 @@ impl LodWorkspace {
         let pair = &scenery.pair;
         let wanted = least_samples(scenery.detail, pair.body.hierarchy.radius());
         let pressed = -min_distance / pair.tolerance;
-        Seen { contacts, pressed, late: self.leniency > 1.0, pace: self.pace, wanted }
+        Seen { contacts, pressed, late: self.leniency.is_late(), pace: self.pace, wanted }
     }
 
     /// By the exact query, and on towards the levels when these would be better.
@@ -295,8 +308,7 @@ impl LodWorkspace {
                 self.warmth = Warmth::Cold;
             }
         }
-        self.tallies = [Tally::default(); 2];
-        self.fronts.iter_mut().for_each(|front| front.nodes.clear());
+        self.without_fronts();
         min_distance
     }
 
@@ -346,7 +358,7 @@ impl LodWorkspace {
         self.least.begin();
         for (k, hierarchy) in [pair.body.hierarchy, pair.obstacle.hierarchy].into_iter().enumerate() {
             let weight = self.densities[k].weight(detail, radius);
-            let judge = Judge { detail: **detail, weight, eye: eye[k], leniency: self.leniency };
+            let judge = Judge { detail: **detail, weight, eye: eye[k], leniency: self.leniency.factor() };
             let mut emit =
                 Emit { pair, world, side: k, contacts: &mut self.contacts, least: &mut self.least };
             let found = find(&mut self.fronts[k], hierarchy, &searches[k], &judge, allowed, &mut emit);
