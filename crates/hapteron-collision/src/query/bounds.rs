@@ -125,26 +125,6 @@ impl Slab {
     }
 }
 
-impl Bounds {
-    /// True when a leaf is farther than the margin.
-    #[inline(always)]
-    pub(super) fn misses(&self, leaf: &Leaf, margin: f32) -> bool {
-        let mut apart = false;
-        let (mut height, mut reach) = (0.0, margin);
-        for k in 0..3 {
-            let own = self.half[k] + margin;
-            apart |= (leaf.min[k] > self.center[k] + own) | (leaf.max[k] < self.center[k] - own);
-            height += leaf.normal[k] * self.center[k];
-            reach += leaf.normal[k].abs() * self.half[k];
-        }
-        let own = Slab { normal: self.normal, low: self.low, high: self.high };
-        apart
-            || height - reach > leaf.high
-            || height + reach < leaf.low
-            || own.misses(&leaf.min, &leaf.max, margin)
-    }
-}
-
 /// The bounds of a node's children after a rigid motion, by lane.
 pub(super) struct MovedChildren {
     center: [[f32; LANES]; 3],
@@ -181,6 +161,29 @@ impl MovedChildren {
         result.low = (lanes(simd, &node.low) + shift).to_array();
         result.high = (lanes(simd, &node.high) + shift).to_array();
         result
+    }
+
+    /// Bit `i` is set when child `i` may be within the margin of a leaf.
+    #[inline(always)]
+    pub(super) fn near<S: Simd>(&self, simd: S, leaf: &Leaf, margin: f32) -> u32 {
+        let mut apart = mask32x8::splat(simd, false);
+        let (mut height, mut reach) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, margin));
+        let (mut own_height, mut own_reach) = (height, reach);
+        for k in 0..3 {
+            let (center, half) = (lanes(simd, &self.center[k]), lanes(simd, &self.half[k]));
+            let own = half + margin;
+            apart |= (center + own).simd_lt(leaf.min[k]) | (center - own).simd_gt(leaf.max[k]);
+            // The leaf's slab against the boxes, and the slabs against its box.
+            height += center * leaf.normal[k];
+            reach += half * leaf.normal[k].abs();
+            let normal = lanes(simd, &self.normal[k]);
+            own_height += normal * (0.5 * (leaf.min[k] + leaf.max[k]));
+            own_reach += normal.abs() * (0.5 * (leaf.max[k] - leaf.min[k]));
+        }
+        apart |= (height - reach).simd_gt(leaf.high) | (height + reach).simd_lt(leaf.low);
+        let (low, high) = (lanes(simd, &self.low), lanes(simd, &self.high));
+        apart |= (own_height - own_reach).simd_gt(high) | (own_height + own_reach).simd_lt(low);
+        bits(!apart)
     }
 
     #[inline(always)]

@@ -49,8 +49,10 @@ impl Pairs {
 pub(super) struct Walk {
     stack: Vec<Frame>,
     candidates: Vec<u32>,
+    /// By candidate of the frame at hand: which children of the body's node it is near, for all that is known.
+    masks: Vec<u32>,
     pending: Vec<u32>,
-    counts: Vec<u32>,
+    inversion: Inversion,
     /// Leaves that may be closer than what was asked for.
     pub near: Pairs,
     /// Those of them that may meet before the near ones must be looked for again.
@@ -90,6 +92,13 @@ pub(super) fn walk<S: Simd>(simd: S, pair: Pair<'_>, ahead: f64, walk: &mut Walk
         walk.candidates.truncate(frame.end as usize);
         let node = &pair.body.nodes[frame.node as usize];
         let children = MovedChildren::new(simd, node, pair.motion);
+        walk.masks.clear();
+        for &candidate in &walk.candidates[frame.begin as usize..] {
+            walk.masks.push(match candidate & LEAF {
+                0 => u32::MAX,
+                _ => children.near(simd, &pair.obstacle.leaves[(candidate & !LEAF) as usize], margins.near),
+            });
+        }
         for lane in 0..LANES {
             let child = node.child[lane];
             if child == EMPTY {
@@ -97,7 +106,7 @@ pub(super) fn walk<S: Simd>(simd: S, pair: Pair<'_>, ahead: f64, walk: &mut Walk
             }
             let begin = walk.candidates.len() as u32;
             let bounds = children.of(lane);
-            refine(simd, pair.obstacle, walk, frame, &bounds, margins.near, child & LEAF != 0);
+            refine(simd, pair.obstacle, walk, frame, lane, &bounds, margins.near, child & LEAF != 0);
             let end = walk.candidates.len() as u32;
             if begin == end {
                 continue;
@@ -110,9 +119,12 @@ pub(super) fn walk<S: Simd>(simd: S, pair: Pair<'_>, ahead: f64, walk: &mut Walk
             }
         }
     }
-    let Walk { counts, near, touching, .. } = walk;
-    for pairs in [near, touching] {
-        invert(counts, pairs, pair.obstacle.leaves.len());
+    let Walk { inversion, near, touching, .. } = walk;
+    inversion.invert(near, pair.obstacle.leaves.len());
+    // Nobody asks what of the obstacle lies in a body that has no inside.
+    touching.obstacle.of.clear();
+    if pair.body.closed {
+        inversion.invert(touching, pair.obstacle.leaves.len());
     }
 }
 
@@ -123,18 +135,19 @@ fn refine<S: Simd>(
     obstacle: &Surface,
     walk: &mut Walk,
     frame: Frame,
+    lane: usize,
     b: &Bounds,
     margin: f32,
     to_leaves: bool,
 ) {
     let extent = b.extent(margin);
-    for i in frame.begin..frame.end {
-        let candidate = walk.candidates[i as usize];
+    for i in 0..(frame.end - frame.begin) as usize {
+        if walk.masks[i] >> lane & 1 == 0 {
+            continue;
+        }
+        let candidate = walk.candidates[frame.begin as usize + i];
         if candidate & LEAF != 0 {
-            let leaf = &obstacle.leaves[(candidate & !LEAF) as usize];
-            if !b.misses(leaf, margin) {
-                walk.candidates.push(candidate);
-            }
+            walk.candidates.push(candidate);
             continue;
         }
         // The node's own box was seen to be near the parent of `b`; look at its children.
@@ -192,30 +205,49 @@ fn meet_leaf<S: Simd>(simd: S, pair: Pair<'_>, walk: &mut Walk, index: u32, begi
     walk.touching.end(index, first[1]);
 }
 
-/// The same pairs by leaf of the obstacle, in the order of its leaves.
-#[inline(always)]
-fn invert(counts: &mut Vec<u32>, pairs: &mut Pairs, leaves: usize) {
-    let Pairs { body, obstacle } = pairs;
-    counts.clear();
-    counts.resize(leaves + 1, 0);
-    for &other in &body.near {
-        counts[other as usize + 1] += 1;
-    }
-    obstacle.of.clear();
-    for leaf in 0..leaves {
-        let (begin, count) = (counts[leaf], counts[leaf + 1]);
-        counts[leaf + 1] += begin;
-        if count > 0 {
-            obstacle.of.push(Neighbourhood { leaf: leaf as u32, begin, end: begin + count });
+/// Memory for listing pairs by leaf of the obstacle; all zero between two uses, so that only what is near costs time.
+#[derive(Clone, Debug, Default)]
+struct Inversion {
+    /// By leaf: how often it occurs, then where its next pair goes.
+    counts: Vec<u32>,
+    /// One bit a leaf: whether it occurs.
+    occurs: Vec<u64>,
+}
+
+impl Inversion {
+    /// The same pairs by leaf of the obstacle, in the order of its leaves.
+    #[inline(always)]
+    fn invert(&mut self, pairs: &mut Pairs, leaves: usize) {
+        let Pairs { body, obstacle } = pairs;
+        self.counts.resize(leaves, 0);
+        self.occurs.resize(leaves.div_ceil(64), 0);
+        for &other in &body.near {
+            self.counts[other as usize] += 1;
+            self.occurs[other as usize / 64] |= 1 << (other % 64);
         }
-    }
-    obstacle.near.clear();
-    obstacle.near.resize(body.near.len(), 0);
-    for &Neighbourhood { leaf, begin, end } in &body.of {
-        for &other in &body.near[begin as usize..end as usize] {
-            let place = &mut counts[other as usize];
-            obstacle.near[*place as usize] = leaf;
-            *place += 1;
+        obstacle.of.clear();
+        let mut begin = 0;
+        for (word, occurs) in self.occurs.iter_mut().enumerate() {
+            let mut bits = std::mem::take(occurs);
+            while bits != 0 {
+                let leaf = 64 * word as u32 + bits.trailing_zeros();
+                bits &= bits - 1;
+                let end = begin + std::mem::replace(&mut self.counts[leaf as usize], begin);
+                obstacle.of.push(Neighbourhood { leaf, begin, end });
+                begin = end;
+            }
+        }
+        obstacle.near.clear();
+        obstacle.near.resize(body.near.len(), 0);
+        for &Neighbourhood { leaf, begin, end } in &body.of {
+            for &other in &body.near[begin as usize..end as usize] {
+                let place = &mut self.counts[other as usize];
+                obstacle.near[*place as usize] = leaf;
+                *place += 1;
+            }
+        }
+        for of in &obstacle.of {
+            self.counts[of.leaf as usize] = 0;
         }
     }
 }
@@ -239,4 +271,92 @@ pub(super) fn displacement(root: &Node, from: &Rigid, to: &Rigid) -> f64 {
             norm(crate::vector::sub(to.point(p), from.point(p)))
         })
         .fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::mesh::TriMesh;
+    use crate::query::feature;
+    use fearless_simd::{Level, dispatch};
+    use nalgebra::{Isometry3, Vector3};
+    use std::collections::BTreeSet;
+
+    /// A closed surface of many small tetrahedra at random places in a cube of the given size.
+    fn scattered(number: &mut impl FnMut() -> f64, count: u32, size: f64) -> Surface {
+        let mut vertices: Vec<Vec3> = Vec::new();
+        for _ in 0..count {
+            let at = [0; 3].map(|_| size * number());
+            vertices.extend((0..4).map(|_| [0, 1, 2].map(|k| at[k] + 0.1 * number())));
+        }
+        let faces = [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
+        let triangles = (0..4 * count).map(|t| faces[t as usize % 4].map(|v| t / 4 * 4 + v)).collect();
+        Surface::build(&TriMesh::new(vertices, triangles).unwrap())
+    }
+
+    /// Pairs of leaves of which a corner of one is closer to a triangle of the other than a distance.
+    fn close(body: &Surface, obstacle: &Surface, motion: &Rigid, within: f64) -> BTreeSet<(u32, u32)> {
+        let mut result = BTreeSet::new();
+        for (i, own) in body.leaves.iter().enumerate() {
+            let triangles = |leaf: &crate::surface::Leaf| {
+                leaf.first_triangle..leaf.first_triangle + u32::from(leaf.triangles)
+            };
+            let corners: Vec<Vec3> =
+                triangles(own).flat_map(|t| feature::corners(t, body)).map(|v| motion.point(v)).collect();
+            for (j, other) in obstacle.leaves.iter().enumerate() {
+                let far = |p: &Vec3| {
+                    triangles(other).all(|t| feature::foot(*p, t, obstacle).signed_distance.abs() >= within)
+                };
+                if !corners.iter().all(far) {
+                    result.insert((i as u32, j as u32));
+                }
+            }
+        }
+        result
+    }
+
+    fn listed(neighbours: &Neighbours) -> Vec<(u32, u32)> {
+        let near = |of: &Neighbourhood| &neighbours.near[of.begin as usize..of.end as usize];
+        neighbours.of.iter().flat_map(|of| near(of).iter().map(|&other| (of.leaf, other))).collect()
+    }
+
+    /// Would catch a pair of close leaves that the walk passes over, one that is listed twice, and lists by leaf of the obstacle that are out of
+    /// order, or do not hold the pairs of this walk and no others.
+    #[test]
+    fn lists_hold_every_close_pair_from_both_sides() {
+        let mut seed = 5u64;
+        let mut number = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let surfaces = [scattered(&mut number, 200, 1.0), scattered(&mut number, 300, 1.5)];
+        let [body, obstacle] = &surfaces;
+        let mut memory = Walk::default();
+        let (mut found, mut all) = (0, 0);
+        for round in 0..20 {
+            let pose = Isometry3::new(
+                Vector3::from([0; 3].map(|_| 2.0 * number())),
+                Vector3::from([0; 3].map(|_| 3.0 * number())),
+            );
+            let [motion, inverse] = [pose, pose.inverse()].map(|pose| Rigid::from_isometry(&pose));
+            let (tolerance, ahead) = (0.05, 0.05 * f64::from(round % 3));
+            let pair = Pair { body, obstacle, motion: &motion, inverse: &inverse, tolerance, travelled: 0.0 };
+            dispatch!(Level::new(), simd => walk(simd, pair, ahead, &mut memory));
+            for (pairs, within) in [(&memory.near, tolerance + ahead), (&memory.touching, ahead)] {
+                let by_body = listed(&pairs.body);
+                let set: BTreeSet<_> = by_body.iter().copied().collect();
+                assert_eq!(set.len(), by_body.len(), "{round}: a pair is listed twice");
+                let close = close(body, obstacle, &motion, within);
+                assert!(close.is_subset(&set), "{round}: {:?}", close.difference(&set).next());
+                let by_obstacle = listed(&pairs.obstacle);
+                assert!(by_obstacle.is_sorted_by_key(|&(other, _)| other), "{round}");
+                assert_eq!(by_obstacle.len(), by_body.len(), "{round}");
+                assert!(by_obstacle.iter().all(|&(other, own)| set.contains(&(own, other))), "{round}");
+                found += close.len();
+            }
+            all += body.leaves.len() * obstacle.leaves.len();
+        }
+        assert!(found > 500 && found < all / 10, "{found} of {all}");
+    }
 }
