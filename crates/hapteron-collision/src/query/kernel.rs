@@ -160,10 +160,10 @@ fn beside<S: Simd>(along: f32x8<S>, length: f32x8<S>, across: f32x8<S>) -> f32x8
     beyond * beyond + across * across
 }
 
-/// [`squared_distances`] for callers without lanes of their own.
+/// [`squared_distances`] for callers without lanes of their own, who know what the machine has.
 #[inline(always)]
-pub(crate) fn point_triangles(p: [f32; 3], b: &TriangleBlock) -> [f32; LANES] {
-    dispatch!(Level::baseline(), simd => squared_distances(simd, p, b).to_array())
+pub(crate) fn point_triangles(level: Level, p: [f32; 3], b: &TriangleBlock) -> [f32; LANES] {
+    dispatch!(level, simd => squared_distances(simd, p, b).to_array())
 }
 
 /// The least of eight.
@@ -216,7 +216,11 @@ mod tests {
                 let local = [0, 1, 2].map(|k| (p[k] - f64::from(block.origin[k])) as f32);
                 let squared =
                     dispatch!(Level::new(), simd => squared_distances(simd, local, block).to_array());
-                assert_eq!(squared, point_triangles(local, block), "the same bits by all instructions");
+                assert_eq!(
+                    squared,
+                    point_triangles(Level::baseline(), local, block),
+                    "the same bits by all instructions"
+                );
                 let found = f64::from(least(&squared).sqrt());
                 let exact = feature::foot(p, leaf.triangle(0), &surface).signed_distance.abs();
                 let error = f64::from(block.error) + f64::from(crate::surface::ERROR) * exact;

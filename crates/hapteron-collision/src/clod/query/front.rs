@@ -5,6 +5,7 @@
 //! a search. And for every node how far it is replaced by its children, so that levels change smoothly.
 
 use super::emit::Emit;
+use super::known::Looks;
 use super::memory::Memory;
 use super::metric::Judge;
 use super::plan::{Plan, Planned};
@@ -54,6 +55,7 @@ pub(super) struct Front {
     walk: u32,
     stack: Vec<(u32, f32)>,
     nearest: Nearest,
+    looks: Looks,
     /// Searches through the tree in this query, and how many there may be.
     searches: usize,
     allowed: usize,
@@ -137,7 +139,7 @@ impl Front {
             return true;
         }
         let p = search.motion.point(search.own.vertices[middle.vertex as usize]);
-        known.is_within(p, search.other, limit) || self.look(middle.vertex, place, search, limit).is_some()
+        known.is_within(p, search, limit) || self.look(middle.vertex, place, search, limit).is_some()
     }
 
     /// A lower bound of the distance of a sample of a node with this middle, plus what the surfaces have moved in all.
@@ -174,7 +176,7 @@ impl Front {
         *clear = self.memory.clear[sample.place];
         if let Some((p, foot)) = found {
             let reach = foot.signed_distance.abs() + AROUND * search.tolerance;
-            *held_at = self.memory.hold(sample.place, p, search, reach);
+            *held_at = self.memory.hold(sample.place, p, search, reach, &mut self.looks);
         }
         found
     }
@@ -186,7 +188,8 @@ impl Front {
         let slack = slack(search.other.radius + search.tolerance);
         let known = self.memory.at(place);
         let band = band(vertex) * search.tolerance;
-        let foot = known.look(p, search, limit, band, slack, &mut self.nearest, &mut self.searches);
+        let Self { nearest, looks, searches, .. } = self;
+        let foot = known.look(p, search, limit, band, slack, nearest, looks, searches);
         self.memory.clear[place] = known.distance + search.travelled;
         foot.map(|foot| (p, foot))
     }

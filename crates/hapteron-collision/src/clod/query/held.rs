@@ -1,14 +1,13 @@
 //! What is kept beside a sample: the triangles that can be its closest one, each with a plane that bounds its distance.
 //!
 //! A triangle lies behind any plane across the direction from its closest point. So wherever the sample goes, its distance to the triangle is at least the height above
-//! that plane: much more than the distance less the way, since the heights above the planes of neighbours change almost alike. Mostly eight heights in single precision
+//! that plane: much more than the distance less the way, since the heights above the planes of neighbours change almost alike. Mostly sixteen heights in single precision
 //! tell that the triangle of the last foot is still the closest, and only that one is looked at exactly.
 
-use super::known::Closest;
+use super::known::{Closest, HELD};
 use crate::clod::nearest::{NOWHERE, from_triangle};
 use crate::query::feature::{self, Foot};
-use crate::query::kernel::at_most;
-use crate::surface::{LANES, Surface};
+use crate::surface::Surface;
 use crate::vector::{Vec3, dot, norm, scale, sub};
 
 /// After so many triangles that were looked at in vain the planes are made anew.
@@ -30,9 +29,9 @@ pub(super) struct Held {
     lane: u32,
     spent: u32,
     /// By lane the height of the base above a plane in front of the triangle, and the plane's normal by axis.
-    heights: [f32; LANES],
-    normals: [[f32; LANES]; 3],
-    triangles: [u32; LANES],
+    heights: [f32; HELD],
+    normals: [[f32; HELD]; 3],
+    triangles: [u32; HELD],
 }
 
 impl Held {
@@ -42,9 +41,9 @@ impl Held {
         corners: [[0.0; 3]; 3],
         lane: 0,
         spent: 0,
-        heights: [f32::INFINITY; LANES],
-        normals: [[0.0; LANES]; 3],
-        triangles: [NOWHERE; LANES],
+        heights: [f32::INFINITY; HELD],
+        normals: [[0.0; HELD]; 3],
+        triangles: [NOWHERE; HELD],
     };
 
     /// The foot of the sample at `p`. None when that may be on another triangle than these.
@@ -71,13 +70,14 @@ impl Held {
     #[inline(always)]
     fn lower(&self, way: Vec3, distance: f64) -> u32 {
         let [x, y, z] = way.map(|c| c as f32);
-        let mut heights = [0.0; LANES];
-        for l in 0..LANES {
+        let mut heights = [0.0; HELD];
+        for l in 0..HELD {
             heights[l] =
                 self.heights[l] + self.normals[0][l] * x + self.normals[1][l] * y + self.normals[2][l] * z;
         }
         let way = x.abs() + y.abs() + z.abs();
-        at_most(&heights, (distance as f32 + 1e-6 * way) * ROUNDING)
+        let limit = (distance as f32 + 1e-6 * way) * ROUNDING;
+        heights.iter().enumerate().fold(0, |mask, (lane, &height)| mask | u32::from(height <= limit) << lane)
     }
 
     /// Looks at the triangles of a mask as well. Of equals the first has the foot.
@@ -117,34 +117,35 @@ impl Held {
 
     fn make_planes(&mut self, p: Vec3, other: &Surface) {
         (self.base, self.spent) = (p, 0);
-        for lane in 0..LANES {
-            let triangle = self.triangles[lane];
-            if triangle == NOWHERE {
-                self.heights[lane] = f32::INFINITY;
-                (0..3).for_each(|k| self.normals[k][lane] = 0.0);
-                continue;
+        let mut corners = [[[0.0; HELD]; 3]; 3];
+        for (lane, &triangle) in self.triangles.iter().enumerate().filter(|(_, t)| **t != NOWHERE) {
+            for (to, from) in corners.iter_mut().zip(feature::corners(triangle, other)) {
+                (0..3).for_each(|k| to[k][lane] = from[k] - p[k]);
             }
-            let corners = feature::corners(triangle, other).map(|c| sub(c, p));
-            let (height, normal) = plane(corners);
-            self.heights[lane] = height;
-            (0..3).for_each(|k| self.normals[k][lane] = normal[k]);
+        }
+        planes(&corners, &mut self.heights, &mut self.normals);
+        for lane in (0..HELD).filter(|&lane| self.triangles[lane] == NOWHERE) {
+            self.heights[lane] = f32::INFINITY;
         }
     }
 }
 
-/// The plane in front of a triangle (seen from the origin) across the direction to it: the height of the origin above it and its normal, which is a bit shorter than a
-/// unit, so that no height is greater than the distance to the triangle.
-#[inline(always)]
-fn plane([a, b, c]: [Vec3; 3]) -> (f32, [f32; 3]) {
-    let from = from_triangle(sub(b, a), sub(c, a), scale(a, -1.0));
-    let distance = norm(from);
-    if !(distance > TOUCHING) {
-        return (0.0, [0.0; 3]);
+/// By lane the plane in front of a triangle (its corners by axis, seen from the origin) across the direction to it: the height of the origin above it and
+/// its normal, which is a bit shorter than a unit, so that no height is greater than the distance to the triangle.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn planes(corners: &[[[f64; HELD]; 3]; 3], heights: &mut [f32; HELD], normals: &mut [[f32; HELD]; 3]) {
+    for lane in 0..HELD {
+        let [a, b, c] = corners.map(|corner| [corner[0][lane], corner[1][lane], corner[2][lane]]);
+        let from = from_triangle(sub(b, a), sub(c, a), scale(a, -1.0));
+        let distance = norm(from);
+        let inverse = if distance > TOUCHING { (1.0 - 1e-6) / distance } else { 0.0 };
+        let normal = scale(from, inverse).map(|c| c as f32);
+        let along = normal.map(f64::from);
+        let height = -dot(along, a).max(dot(along, b)).max(dot(along, c));
+        // Rounded down.
+        heights[lane] = (height - height.abs() * 1e-7 - f64::from(f32::MIN_POSITIVE)) as f32;
+        (0..3).for_each(|k| normals[k][lane] = normal[k]);
     }
-    let normal = scale(from, (1.0 - 1e-6) / distance).map(|c| c as f32);
-    let along = normal.map(f64::from);
-    let height = -dot(along, a).max(dot(along, b)).max(dot(along, c));
-    ((height as f32).next_down(), normal)
 }
 
 #[cfg(test)]
@@ -165,7 +166,13 @@ mod tests {
             let lift = [0; 3].map(|_| 1e-3 * number());
             // Some triangles without area, some seen from a corner.
             let corners = if round % 7 == 0 { [corners[0], corners[1], corners[0]] } else { corners };
-            let (height, normal) = plane(corners.map(|c| sub(c, lift)));
+            let mut lanes = [[[0.0; HELD]; 3]; 3];
+            for (to, from) in lanes.iter_mut().zip(corners) {
+                (0..3).for_each(|k| to[k][round % HELD] = from[k] - lift[k]);
+            }
+            let (mut heights, mut normals) = ([0.0; HELD], [[0.0; HELD]; 3]);
+            planes(&lanes, &mut heights, &mut normals);
+            let (height, normal) = (heights[round % HELD], normals.map(|axis| axis[round % HELD]));
             let way = [0; 3].map(|_| 5e-4 * number());
             let [a, b, c] = corners;
             let p = [0, 1, 2].map(|k| lift[k] + way[k]);

@@ -16,12 +16,15 @@ const PROJECTIONS: usize = 16;
 pub(super) struct Least {
     best: [Option<(u32, f64)>; 2],
     last: [Option<u32>; 2],
+    /// From which sample the last descent began, and at which vertex it ended.
+    descents: [Option<[u32; 2]>; 2],
     nearest: Nearest,
 }
 
 impl Least {
     pub(super) fn reset(&mut self) {
         self.last = [None; 2];
+        self.descents = [None; 2];
     }
 
     pub(super) fn begin(&mut self) {
@@ -40,14 +43,20 @@ impl Least {
     pub(super) fn refine(&mut self, fronts: &mut [Front; 2], searches: [&Search<'_>; 2]) -> f64 {
         let mut least = f64::INFINITY;
         for (k, front) in fronts.iter_mut().enumerate() {
-            let mut starts = [self.best[k].map(|b| b.0), self.last[k]];
-            if starts[0] == starts[1] {
-                starts[1] = None;
-            }
-            self.last[k] = None;
+            let best = self.best[k].map(|b| b.0);
+            let from_best = best.and_then(|best| {
+                // From the same sample it goes where it went the last time, as far as that is still near.
+                let known = self.descents[k].filter(|d| d[0] == best).map(|d| d[1]);
+                let end = known.and_then(|known| Self::descend(front, searches[k], known));
+                let end = end.filter(|end| self.best[k].is_none_or(|best| end.1 <= best.1));
+                end.or_else(|| Self::descend(front, searches[k], best))
+            });
+            let last =
+                core::mem::take(&mut self.last[k]).filter(|&last| from_best.is_none_or(|end| end.0 != last));
+            self.descents[k] = best.zip(from_best).map(|(best, end)| [best, end.0]);
             let mut own = f64::INFINITY;
-            for start in starts.into_iter().flatten() {
-                let end = Self::descend(front, searches[k], start);
+            let from_last = last.and_then(|last| Self::descend(front, searches[k], last));
+            for end in [from_best, from_last] {
                 if let Some((vertex, signed)) = end.filter(|e| e.1 < own) {
                     own = signed;
                     self.last[k] = Some(vertex);

@@ -1,7 +1,7 @@
 //! What is remembered of the vertices of a surface.
 
 use super::held::Held;
-use super::known::Known;
+use super::known::{Known, Looks};
 use super::plan::Planned;
 use super::side::Search;
 use crate::clod::nearest::NOWHERE;
@@ -76,10 +76,17 @@ impl Memory {
 
     /// Holds the triangles around the vertex at `p`, within `reach`, whose foot was found; gives where.
     #[inline(always)]
-    pub(super) fn hold(&mut self, place: usize, p: Vec3, search: &Search<'_>, reach: f64) -> u32 {
+    pub(super) fn hold(
+        &mut self,
+        place: usize,
+        p: Vec3,
+        search: &Search<'_>,
+        reach: f64,
+        looks: &mut Looks,
+    ) -> u32 {
         let known = &self.known[place];
         let other = search.other;
-        let closest = known.closest(p, other, reach);
+        let closest = known.closest(p, search, reach, looks);
         let triangle = known.triangle;
         if triangle == NOWHERE {
             return 0;

@@ -27,6 +27,7 @@ use crate::surface::Surface;
 use crate::vector::{Rigid, Vec3, scale};
 use budget::Leniency;
 use emit::Emit;
+use fearless_simd::Level;
 use front::{Front, Tally, find};
 use least::Least;
 use metric::{Density, Judge, least_samples};
@@ -343,7 +344,8 @@ impl LodWorkspace {
         let Scenery { pair, last, .. } = scenery;
         let (own, other) = (pair.body.surface, pair.obstacle.surface);
         let travelled = self.state.map_or(0.0, |s| s.travelled);
-        let of_body = Search { own, other, motion: &pair.motion, last, tolerance: pair.tolerance, travelled };
+        let (level, tolerance) = (Level::new(), pair.tolerance);
+        let of_body = Search { own, other, motion: &pair.motion, last, level, tolerance, travelled };
         [of_body, Search { own: other, other: own, motion: &pair.inverse, last: back, ..of_body }]
     }
 

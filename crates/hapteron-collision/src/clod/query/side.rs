@@ -2,6 +2,7 @@
 
 use crate::surface::Surface;
 use crate::vector::Rigid;
+use fearless_simd::Level;
 
 /// One side of a query.
 #[derive(Clone, Copy)]
@@ -12,6 +13,8 @@ pub(super) struct Search<'a> {
     pub motion: &'a Rigid,
     /// The same at the last query.
     pub last: &'a Rigid,
+    /// The instructions that the machine has.
+    pub level: Level,
     pub tolerance: f64,
     /// How far the surfaces have moved in all.
     pub travelled: f64,

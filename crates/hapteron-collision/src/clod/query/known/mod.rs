@@ -8,11 +8,13 @@ use super::side::Search;
 use crate::clod::nearest::{NOWHERE, Nearest, box_distances, misses_slab};
 use crate::query::feature::{self, Foot};
 use crate::query::kernel::{at_most, least, point_triangles};
-use crate::surface::{EMPTY, ERROR, LANES, LEAF, Surface};
+use crate::surface::{EMPTY, ERROR, LANES, LEAF};
 use crate::vector::{Vec3, norm, sub};
 
 /// Leaves that are remembered.
 const KEPT: usize = 6;
+/// Triangles that are held for a sample.
+pub(super) const HELD: usize = 16;
 /// Covers the rounding of squares in single precision.
 const ROUNDING: f32 = 1.0 + 1e-6;
 
@@ -40,8 +42,28 @@ pub(super) struct Known {
 /// The triangles closest to a vertex, and a lower bound of the distances of all others.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Closest {
-    pub triangles: [u32; LANES],
+    pub triangles: [u32; HELD],
     pub rest: f64,
+}
+
+/// What the last look at the remembered leaves found, by leaf.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Looks {
+    looked: [bool; KEPT],
+    /// Squared distances of the triangles, and the greatest error of the distances.
+    squared: [[f32; LANES]; KEPT],
+    error: [f32; KEPT],
+}
+
+impl Looks {
+    /// Looks at a leaf, unless that has been done. Gives its distance and the greatest error.
+    #[inline(always)]
+    fn at(&mut self, k: usize, p: Vec3, search: &Search<'_>, leaf: u32) -> f32 {
+        if !self.looked[k] {
+            (self.looked[k], self.error[k]) = (true, to_leaf(p, search, leaf, &mut self.squared[k]).1);
+        }
+        self.error[k]
+    }
 }
 
 impl Known {
@@ -68,14 +90,15 @@ impl Known {
         band: f64,
         slack: f32,
         nearest: &mut Nearest,
+        looks: &mut Looks,
         searches: &mut usize,
     ) -> Option<Foot> {
-        let mut found = self.settle(p, search.other, limit);
+        let mut found = self.settle(p, search, limit, looks);
         if found.is_none() {
-            self.search(p, search.other, limit, band, slack, &mut nearest.stack);
+            self.search(p, search, limit, band, slack, &mut nearest.stack);
             self.searched = p;
             *searches += 1;
-            found = self.settle(p, search.other, limit);
+            found = self.settle(p, search, limit, looks);
         }
         // More leaves are equally far than are remembered.
         let (foot, distance) = found.unwrap_or_else(|| {
@@ -90,43 +113,46 @@ impl Known {
         foot.filter(|_| distance <= limit)
     }
 
-    /// The triangles that are closest to a vertex at `p`, from the leaves that are within `reach`.
+    /// The triangles that are closest to a vertex at `p`, from the leaves that are within `reach`; `looks` are those of the last look, which was from there.
     #[inline(always)]
-    pub(super) fn closest(&self, p: Vec3, other: &Surface, reach: f64) -> Closest {
+    pub(super) fn closest(&self, p: Vec3, search: &Search<'_>, reach: f64, looks: &mut Looks) -> Closest {
+        let other = search.other;
         let moved = norm(sub(p, self.searched));
-        let mut result = Closest { triangles: [NOWHERE; LANES], rest: f64::from(self.rest) - moved };
-        let (mut lowers, mut dropped) = ([f32::INFINITY; LANES], f32::INFINITY);
-        let mut squared = [0.0; LANES];
+        let mut result = Closest { triangles: [NOWHERE; HELD], rest: f64::from(self.rest) - moved };
+        let (mut all, mut count) = ([(f32::INFINITY, NOWHERE); KEPT * LANES], 0);
         for k in (0..KEPT).filter(|&k| self.leaves[k] != NOWHERE) {
             let bound = f64::from(self.lower[k]) - moved;
             if bound > reach {
                 result.rest = result.rest.min(bound);
                 continue;
             }
-            to_leaf(p, other, self.leaves[k], &mut squared);
+            looks.at(k, p, search, self.leaves[k]);
             let index = self.leaves[k] as usize;
             let (leaf, block) = (&other.leaves[index], &other.blocks[index]);
             for lane in 0..usize::from(leaf.triangles) {
-                let far = squared[lane].sqrt();
-                let lower = far - (block.error + ERROR * far);
-                let (triangle, kept) = (leaf.triangle(lane), &mut result.triangles);
-                dropped = dropped.min(if lower < lowers[LANES - 1] {
-                    insert((triangle, lower), kept, &mut lowers)
-                } else {
-                    lower
-                });
+                let far = looks.squared[k][lane].sqrt();
+                all[count] = (far - (block.error + ERROR * far), leaf.triangle(lane));
+                count += 1;
             }
         }
-        result.rest = result.rest.min(f64::from(dropped));
+        let all = &mut all[..count];
+        if count > HELD {
+            let by_distance = |a: &(f32, u32), b: &(f32, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+            let (_, dropped, _) = all.select_nth_unstable_by(HELD, by_distance);
+            result.rest = result.rest.min(f64::from(dropped.0));
+        }
+        for (triangle, close) in result.triangles.iter_mut().zip(all) {
+            *triangle = close.1;
+        }
         result
     }
 
     /// Whether some triangle is surely within a distance, as far as that shows without a search.
     #[inline(always)]
-    pub(super) fn is_within(&self, p: Vec3, other: &Surface, limit: f64) -> bool {
+    pub(super) fn is_within(&self, p: Vec3, search: &Search<'_>, limit: f64) -> bool {
         let mut squared = [0.0; LANES];
         self.leaves[0] != NOWHERE && {
-            let (near, wrong) = to_leaf(p, other, self.leaves[0], &mut squared);
+            let (near, wrong) = to_leaf(p, search, self.leaves[0], &mut squared);
             f64::from(near + wrong) <= limit
         }
     }
@@ -134,16 +160,21 @@ impl Known {
     /// The closest foot and its distance, from the leaves that are remembered; none without a foot where all that is known is
     /// that the distance is at least so much, which is beyond the limit. None when they do not tell.
     #[inline(always)]
-    fn settle(&mut self, p: Vec3, other: &Surface, limit: f64) -> Option<(Option<Foot>, f64)> {
+    fn settle(
+        &mut self,
+        p: Vec3,
+        search: &Search<'_>,
+        limit: f64,
+        Looks { looked, squared, error }: &mut Looks,
+    ) -> Option<(Option<Foot>, f64)> {
+        let other = search.other;
+        *looked = [false; KEPT];
         // Not a number before the first search.
         let moved = norm(sub(p, self.searched));
         let rest = f64::from(self.rest) - moved;
         if !(rest > 0.0) {
             return None;
         }
-        let mut squared = [[0.0; LANES]; KEPT];
-        let mut error = [0.0; KEPT];
-        let mut looked = [false; KEPT];
         let (mut within, mut lower) = (f32::INFINITY, rest);
         for k in 0..KEPT {
             let bound = f64::from(self.lower[k]) - moved;
@@ -151,7 +182,7 @@ impl Known {
                 lower = lower.min(bound);
                 continue;
             }
-            let (near, wrong) = to_leaf(p, other, self.leaves[k], &mut squared[k]);
+            let (near, wrong) = to_leaf(p, search, self.leaves[k], &mut squared[k]);
             (looked[k], error[k]) = (true, wrong);
             lower = lower.min(f64::from(near - wrong));
             within = if near + wrong < within { near + wrong } else { within };
@@ -183,12 +214,13 @@ impl Known {
     fn search(
         &mut self,
         p: Vec3,
-        other: &Surface,
+        search: &Search<'_>,
         limit: f64,
         band: f64,
         slack: f32,
         stack: &mut Vec<(f32, u32)>,
     ) {
+        let other = search.other;
         let seeds = self.leaves;
         self.leaves = [NOWHERE; KEPT];
         self.lower = [f32::INFINITY; KEPT];
@@ -198,7 +230,7 @@ impl Known {
         let mut cut = limit as f32 + band;
         self.rest = f32::INFINITY;
         for leaf in seeds.into_iter().filter(|&l| l != NOWHERE) {
-            let (near, wrong) = to_leaf(p, other, leaf, &mut squared);
+            let (near, wrong) = to_leaf(p, search, leaf, &mut squared);
             self.keep(leaf, near - wrong);
             cut = cut.min(near + wrong + band);
         }
@@ -222,7 +254,7 @@ impl Known {
                     self.rest = self.rest.min(farthest);
                     continue;
                 }
-                let (near, wrong) = to_leaf(p, other, leaf, &mut squared);
+                let (near, wrong) = to_leaf(p, search, leaf, &mut squared);
                 self.keep(leaf, near - wrong);
                 cut = cut.min(near + wrong + band);
                 continue;
@@ -306,10 +338,10 @@ fn push_near(children: [u32; LANES], bounds: [f32; LANES], stack: &mut Vec<(f32,
 
 /// Distance of a point to a leaf and its greatest error; squared distances to its triangles.
 #[inline(always)]
-fn to_leaf(p: Vec3, surface: &Surface, leaf: u32, squared: &mut [f32; LANES]) -> (f32, f32) {
-    let block = &surface.blocks[leaf as usize];
+fn to_leaf(p: Vec3, search: &Search<'_>, leaf: u32, squared: &mut [f32; LANES]) -> (f32, f32) {
+    let block = &search.other.blocks[leaf as usize];
     let local = [0, 1, 2].map(|k| (p[k] - f64::from(block.origin[k])) as f32);
-    *squared = point_triangles(local, block);
+    *squared = point_triangles(search.level, local, block);
     let near = least(squared).sqrt();
     (near, block.error + ERROR * near)
 }

@@ -1,6 +1,7 @@
 //! Feet against brute force.
 
 use super::*;
+use crate::surface::Surface;
 use crate::vector::{Rigid, norm, sub};
 
 /// A wavy sheet of 2 n^2 triangles, a metre wide.
@@ -47,10 +48,12 @@ fn feet_are_the_closest_along_motions() {
                 other: &surface,
                 motion: &still,
                 last: &still,
+                level: fearless_simd::Level::new(),
                 tolerance: limit,
                 travelled,
             };
-            let found = known.look(p, &search, limit, band, 2e-6, &mut nearest, &mut searches);
+            let looks = &mut Looks::default();
+            let found = known.look(p, &search, limit, band, 2e-6, &mut nearest, looks, &mut searches);
             let feet = (0..surface.triangles.len() as u32).map(|t| feature::foot(p, t, &surface));
             let least = feet.map(|f| f.signed_distance.abs()).fold(f64::INFINITY, f64::min);
             match found {
