@@ -56,13 +56,12 @@ pub(super) struct Looks {
 }
 
 impl Looks {
-    /// Looks at a leaf, unless that has been done. Gives its distance and the greatest error.
+    /// Looks at a leaf, unless that has been done.
     #[inline(always)]
-    fn at(&mut self, k: usize, p: Vec3, search: &Search<'_>, leaf: u32) -> f32 {
+    fn at(&mut self, k: usize, p: Vec3, search: &Search<'_>, leaf: u32) {
         if !self.looked[k] {
             (self.looked[k], self.error[k]) = (true, to_leaf(p, search, leaf, &mut self.squared[k]).1);
         }
-        self.error[k]
     }
 }
 
