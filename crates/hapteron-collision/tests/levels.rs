@@ -1,31 +1,18 @@
 //! Queries by contact levels against the exact query.
 #![allow(clippy::unwrap_used)]
 
+#[path = "common/models.rs"]
+mod models;
 #[path = "common/ball.rs"]
 mod shape;
 
-use hapteron_collision::clod::{Combine, Detail, Hierarchy, Lod, LodWorkspace, View, query_levels};
+use hapteron_collision::clod::{Combine, Detail, LodWorkspace, View, query_levels};
 use hapteron_collision::mesh::TriMesh;
-use hapteron_collision::{Contact, QueryWorkspace, Surface, query};
+use hapteron_collision::{Contact, QueryWorkspace, query};
+use models::Models;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-/// Two surfaces with their levels.
-struct Models {
-    surfaces: [Surface; 2],
-    hierarchies: [Hierarchy; 2],
-}
-
 impl Models {
-    fn new(meshes: [TriMesh; 2]) -> Self {
-        let surfaces = meshes.each_ref().map(Surface::build);
-        let hierarchies = surfaces.each_ref().map(|s| Hierarchy::build(s, &mut |_| true).unwrap());
-        Self { surfaces, hierarchies }
-    }
-
-    fn lod(&self, k: usize) -> Lod<'_> {
-        Lod { surface: &self.surfaces[k], hierarchy: &self.hierarchies[k] }
-    }
-
     /// Contacts and least distance by levels.
     fn levels(
         &self,

@@ -1,29 +1,20 @@
 //! Queries by contact levels with odd tolerances, thresholds, budgets and poses.
 #![allow(clippy::unwrap_used)]
 
+#[path = "common/models.rs"]
+mod models;
 #[path = "common/ball.rs"]
 mod shape;
 
-use hapteron_collision::clod::{Detail, Hierarchy, Lod, LodWorkspace, View, query_levels};
+use hapteron_collision::clod::{Detail, Lod, LodWorkspace, View, query_levels};
 use hapteron_collision::mesh::TriMesh;
-use hapteron_collision::{Contact, QueryWorkspace, Surface, query};
+use hapteron_collision::{Contact, QueryWorkspace, query};
+use models::Models;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 const TOLERANCE: f64 = 1.5e-3;
 
-/// Two surfaces with their levels.
-struct Models {
-    surfaces: [Surface; 2],
-    hierarchies: [Hierarchy; 2],
-}
-
 impl Models {
-    fn new(meshes: [TriMesh; 2]) -> Self {
-        let surfaces = meshes.each_ref().map(Surface::build);
-        let hierarchies = surfaces.each_ref().map(|s| Hierarchy::build(s, &mut |_| true).unwrap());
-        Self { surfaces, hierarchies }
-    }
-
     /// A bumpy ball and its cavity, 1 mm apart.
     fn balls(rings: u32) -> Self {
         let bump = |theta: f64, phi: f64| 2e-4 * (14.0 * theta).sin() * (12.0 * phi).cos() * theta.sin();
@@ -34,7 +25,7 @@ impl Models {
     }
 
     fn lods(&self) -> [Lod<'_>; 2] {
-        [0, 1].map(|k| Lod { surface: &self.surfaces[k], hierarchy: &self.hierarchies[k] })
+        [0, 1].map(|k| self.lod(k))
     }
 
     fn levels(
