@@ -1,12 +1,21 @@
 //! The inner loops, eight lanes at a time; every lane is the same IEEE arithmetic on any machine.
 
 use crate::surface::{ERROR, LANES, Node, Surface, TriangleBlock};
-use fearless_simd::{Level, Simd, dispatch, f32x8, mask32x8, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, f32x8, f32x16, mask32x8, prelude::*, u32x16};
+
+/// Lanes of the loops over leaves.
+pub(super) const WIDE: usize = 16;
 
 /// Eight numbers to calculate with, by the instructions that `simd` stands for.
 #[inline(always)]
 pub(super) fn lanes<S: Simd>(simd: S, values: &[f32; LANES]) -> f32x8<S> {
     f32x8::load_array_ref(simd, values)
+}
+
+/// Sixteen numbers.
+#[inline(always)]
+pub(super) fn wide<S: Simd>(simd: S, values: &[f32; WIDE]) -> f32x16<S> {
+    f32x16::load_array_ref(simd, values)
 }
 
 /// The same by axis.
@@ -24,35 +33,37 @@ pub(super) fn bits<S: Simd>(mask: mask32x8<S>) -> u32 {
     mask.to_bitmask() as u32
 }
 
-/// Boxes and slabs of up to eight leaves, by lane.
+/// Boxes and slabs of up to sixteen leaves, by lane.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct LeafBounds {
-    min: [[f32; LANES]; 3],
-    max: [[f32; LANES]; 3],
-    normal: [[f32; LANES]; 3],
-    low: [f32; LANES],
-    high: [f32; LANES],
+    min: [[f32; WIDE]; 3],
+    max: [[f32; WIDE]; 3],
+    normal: [[f32; WIDE]; 3],
+    low: [f32; WIDE],
+    high: [f32; WIDE],
+    leaf: [u32; WIDE],
 }
 
 impl LeafBounds {
     /// Lanes that are infinitely far from everything.
     pub(super) const EMPTY: Self = Self {
-        min: [[f32::INFINITY; LANES]; 3],
-        max: [[f32::NEG_INFINITY; LANES]; 3],
-        normal: [[0.0; LANES]; 3],
-        low: [f32::NEG_INFINITY; LANES],
-        high: [f32::INFINITY; LANES],
+        min: [[f32::INFINITY; WIDE]; 3],
+        max: [[f32::NEG_INFINITY; WIDE]; 3],
+        normal: [[0.0; WIDE]; 3],
+        low: [f32::NEG_INFINITY; WIDE],
+        high: [f32::INFINITY; WIDE],
+        leaf: [u32::MAX; WIDE],
     };
 
     /// Takes those of the given leaves.
     #[inline(always)]
     pub(super) fn gather(&mut self, surface: &Surface, leaves: &[u32]) {
-        if leaves.len() < LANES {
+        if leaves.len() < WIDE {
             *self = Self::EMPTY;
         }
-        for (lane, &leaf) in leaves.iter().enumerate().take(LANES) {
-            let leaf = &surface.leaves[leaf as usize];
+        for (lane, &index) in leaves.iter().enumerate().take(WIDE) {
+            let leaf = &surface.leaves[index as usize];
             for axis in 0..3 {
                 self.min[axis][lane] = leaf.min[axis];
                 self.max[axis][lane] = leaf.max[axis];
@@ -60,24 +71,33 @@ impl LeafBounds {
             }
             self.low[lane] = leaf.low;
             self.high[lane] = leaf.high;
+            self.leaf[lane] = index;
         }
     }
 
     /// Lower bounds of the squared distances of a point to the leaves.
     #[inline(always)]
-    pub(super) fn lower<S: Simd>(&self, simd: S, p: [f32; 3], slack: f32) -> f32x8<S> {
-        let zero = f32x8::splat(simd, 0.0);
+    pub(super) fn lower<S: Simd>(&self, simd: S, p: [f32; 3], slack: f32) -> f32x16<S> {
+        let zero = f32x16::splat(simd, 0.0);
         let (mut sum, mut height) = (zero, zero);
         for (k, &c) in p.iter().enumerate() {
-            let c = f32x8::splat(simd, c);
-            let (under, over) = (lanes(simd, &self.min[k]) - c, c - lanes(simd, &self.max[k]));
+            let c = f32x16::splat(simd, c);
+            let (under, over) = (wide(simd, &self.min[k]) - c, c - wide(simd, &self.max[k]));
             let beyond = (under.max(over) - slack).max(zero);
             sum += beyond * beyond;
-            height += lanes(simd, &self.normal[k]) * c;
+            height += wide(simd, &self.normal[k]) * c;
         }
-        let (under, over) = (lanes(simd, &self.low) - height, height - lanes(simd, &self.high));
+        let (under, over) = (wide(simd, &self.low) - height, height - wide(simd, &self.high));
         let beyond = (under.max(over) - slack).max(zero);
         (beyond * beyond).max(sum)
+    }
+
+    /// The same, infinite for one leaf.
+    #[inline(always)]
+    pub(super) fn without<S: Simd>(&self, lower: f32x16<S>, leaf: u32) -> f32x16<S> {
+        let simd = lower.simd;
+        let it = u32x16::load_array_ref(simd, &self.leaf).simd_eq(leaf);
+        it.select(f32x16::splat(simd, f32::INFINITY), lower)
     }
 }
 

@@ -8,11 +8,12 @@ const PAGE: usize = 64;
 /// Per-vertex results on one surface.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Side {
-    /// By page of vertices: where its results are, plus one; zero when none of its vertices has any.
+    /// By page of vertices: where its results are; zero, where no vertex has any, when none of its vertices does.
     pages: Vec<u32>,
-    results: Vec<Page>,
-    /// One bit a vertex: whether it has a signed distance now. Most that are asked for have none, and this fits the nearest cache.
-    known: Vec<u64>,
+    /// Signed distances to the other surface, infinite where none is known.
+    signed: Vec<[f64; PAGE]>,
+    /// The leaves of the other surface that were closest when last asked, plus one.
+    last: Vec<[u32; PAGE]>,
     /// Vertices with a signed distance, in the order found.
     found: Vec<u32>,
     /// By neighbourhood of the last walk.
@@ -39,29 +40,23 @@ impl Clear {
     }
 }
 
-#[derive(Clone, Debug)]
-struct Page {
-    /// Signed distance to the other surface, where one is known.
-    signed: [f64; PAGE],
-    /// The leaf of the other surface that was closest in the last query, plus one.
-    last: [u32; PAGE],
-}
-
 impl Side {
     /// Forgets everything and makes room for a surface.
     pub(super) fn reset(&mut self, surface: &Surface) {
         self.found.clear();
-        self.results.clear();
+        self.signed.clear();
+        self.signed.push([f64::INFINITY; PAGE]);
+        self.last.clear();
+        self.last.push([0; PAGE]);
         self.pages.clear();
         self.pages.resize(surface.vertices.len().div_ceil(PAGE), 0);
-        self.known.clear();
-        self.known.resize(self.pages.len(), 0);
     }
 
     /// Forgets the distances of the last query, at a cost in proportion to what it found.
     pub(super) fn clear(&mut self) {
         for &vertex in &self.found {
-            self.known[vertex as usize / PAGE] = 0;
+            let page = self.pages[vertex as usize / PAGE] as usize;
+            self.signed[page][vertex as usize % PAGE] = f64::INFINITY;
         }
         self.found.clear();
     }
@@ -71,39 +66,32 @@ impl Side {
         &self.found
     }
 
-    #[inline(always)]
-    fn page(&self, vertex: u32) -> Option<&Page> {
-        let page = self.pages[vertex as usize / PAGE].checked_sub(1)?;
-        self.results.get(page as usize)
-    }
-
     /// Signed distance of a vertex to the other surface, infinite when farther than the tolerance.
     #[inline(always)]
     pub(super) fn signed_distance(&self, vertex: u32) -> f64 {
-        if self.known[vertex as usize / PAGE] >> (vertex as usize % PAGE) & 1 == 0 {
-            return f64::INFINITY;
-        }
-        self.page(vertex).map_or(f64::INFINITY, |page| page.signed[vertex as usize % PAGE])
+        let page = self.pages[vertex as usize / PAGE] as usize;
+        self.signed[page][vertex as usize % PAGE]
     }
 
     /// The leaf of the other surface that was closest when last asked, a first guess for the next time.
     #[inline(always)]
     pub(super) fn last_leaf(&self, vertex: u32) -> Option<u32> {
-        self.page(vertex).and_then(|page| page.last[vertex as usize % PAGE].checked_sub(1))
+        let page = self.pages[vertex as usize / PAGE] as usize;
+        self.last[page][vertex as usize % PAGE].checked_sub(1)
     }
 
     /// Notes the signed distance of a vertex and the leaf where it was found.
     #[inline(always)]
     pub(super) fn set(&mut self, vertex: u32, signed_distance: f64, leaf: u32) {
-        let place = &mut self.pages[vertex as usize / PAGE];
-        if *place == 0 {
-            self.results.push(Page { signed: [f64::INFINITY; PAGE], last: [0; PAGE] });
-            *place = self.results.len() as u32;
+        let page = &mut self.pages[vertex as usize / PAGE];
+        if *page == 0 {
+            *page = self.signed.len() as u32;
+            self.signed.push([f64::INFINITY; PAGE]);
+            self.last.push([0; PAGE]);
         }
-        let page = &mut self.results[*place as usize - 1];
-        page.signed[vertex as usize % PAGE] = signed_distance;
-        page.last[vertex as usize % PAGE] = leaf + 1;
-        self.known[vertex as usize / PAGE] |= 1 << (vertex as usize % PAGE);
+        let page = *page as usize;
+        self.signed[page][vertex as usize % PAGE] = signed_distance;
+        self.last[page][vertex as usize % PAGE] = leaf + 1;
         self.found.push(vertex);
     }
 }

@@ -2,13 +2,14 @@
 
 use super::Pair;
 use super::feature::{self, Feature, Foot};
-use super::kernel::{self, LeafBounds};
+use super::kernel::{self, LeafBounds, WIDE};
 use super::result::{Found, Sink};
 use super::side::{Clear, Side};
 use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{ERROR, LANES, Surface, VertexNormal};
 use crate::vector::{Rigid, Vec3, dot, scale};
 use fearless_simd::{Simd, prelude::*};
+use std::ops::Range;
 
 /// Where the vertices of one surface look for their feet on the other.
 struct Search<'a, S> {
@@ -30,37 +31,44 @@ struct Search<'a, S> {
 /// Memory of the search, kept to be reused.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
-    /// Bounds of the leaves in a neighbourhood, eight at a time.
-    pub bounds: Vec<LeafBounds>,
+    /// Bounds of the leaves in a neighbourhood, by groups.
+    bounds: Vec<LeafBounds>,
     probes: Vec<Probe>,
-    lowers: Vec<[f32; LANES]>,
+    /// By probe and group of its neighbourhood: lower bounds of the squared distances, infinite for the leaf looked in first.
+    lowers: Vec<[f32; WIDE]>,
+    /// Which probes look in which leaves: first each one where it may be closest, then wherever else it must. Longer than what is in use, as the lists that follow.
     looks: Vec<Look>,
+    squared: Vec<[f32; LANES]>,
+    /// Which triangles may be the closest, by probe, and the feet on them.
+    candidates: Vec<(u32, u32)>,
+    feet: Vec<Foot>,
 }
 
 /// A vertex in search of its foot.
 #[derive(Clone, Copy, Debug)]
 struct Probe {
-    vertex: u32,
     point: Vec3,
+    vertex: u32,
     /// The closest triangle is not farther than this.
     within: f32,
-    /// The leaf to look in first.
-    guess: u32,
-    /// Its neighbourhood, a range of the near leaves.
+    /// Where its neighbourhood begins in the near leaves, and of how many groups it is.
     begin: u32,
-    end: u32,
-    /// Where its bounds of those begin.
-    lowers: u32,
-    best: Option<(u32, Foot)>,
+    groups: u32,
+    /// The closest foot so far, and its distance.
+    best: u32,
+    distance: f64,
 }
 
-/// A leaf in which a probe looks: the squared distances of its triangles, and how certain these are.
-#[derive(Clone, Copy, Debug)]
+impl Probe {
+    const NONE: u32 = u32::MAX;
+}
+
+/// A leaf in which a probe looks, and how certain the distances of its triangles are.
+#[derive(Clone, Copy, Debug, Default)]
 struct Look {
     probe: u32,
     leaf: u32,
     error: f32,
-    squared: [f32; LANES],
 }
 
 /// Gives every vertex of the body within the tolerance its signed distance, and makes its contact.
@@ -131,7 +139,7 @@ fn run<S: Simd>(
     scratch: &mut Scratch,
     mut push: impl FnMut(u32, Vec3, &Foot),
 ) {
-    scratch.probes.clear();
+    scratch.forget();
     for (i, neighbourhood) in search.neighbours.of.iter().enumerate() {
         let clear = side.clear[i].holds(search.travelled, search.tolerance + f64::from(search.slack));
         if !clear {
@@ -142,16 +150,32 @@ fn run<S: Simd>(
         if scratch.probes.len() < BATCH && !last {
             continue;
         }
-        look_in_guesses(search, scratch);
-        look_elsewhere(search, scratch);
-        settle(search, scratch);
+        let first = scratch.probes.len();
+        look(search, scratch, 0..first);
+        let count = elsewhere(search, scratch);
+        look(search, scratch, first..count);
+        let count = candidates(search, scratch, count);
+        settle(search, scratch, count);
         for probe in &scratch.probes {
-            let Some((triangle, foot)) = probe.best else { continue };
+            if probe.best == Probe::NONE {
+                continue;
+            }
+            let (triangle, foot) =
+                (scratch.candidates[probe.best as usize].1, &scratch.feet[probe.best as usize]);
             side.set(probe.vertex, foot.signed_distance, triangle / LANES as u32);
-            push(probe.vertex, probe.point, &foot);
+            push(probe.vertex, probe.point, foot);
         }
-        scratch.probes.clear();
-        scratch.lowers.clear();
+        scratch.forget();
+    }
+}
+
+impl Scratch {
+    /// Makes room for the next batch.
+    #[inline(always)]
+    fn forget(&mut self) {
+        self.probes.clear();
+        self.lowers.clear();
+        self.feet.clear();
     }
 }
 
@@ -165,19 +189,21 @@ fn probes_of_leaf<S: Simd>(
 ) -> f64 {
     let &Neighbourhood { leaf, begin, end } = of;
     let near = &search.neighbours.near[begin as usize..end as usize];
-    let groups = near.len().div_ceil(LANES);
+    let groups = near.len().div_ceil(WIDE);
     if scratch.bounds.len() < groups {
         scratch.bounds.resize(groups, LeafBounds::EMPTY);
     }
-    for (bounds, eight) in scratch.bounds.iter_mut().zip(near.chunks(LANES)) {
-        bounds.gather(search.other, eight);
+    for (bounds, some) in scratch.bounds.iter_mut().zip(near.chunks(WIDE)) {
+        bounds.gather(search.other, some);
     }
     let within = (search.tolerance as f32).next_up();
     let limit = within * within * ROUNDING;
     let own = &search.own.leaves[leaf as usize];
     let mut closest = f32::INFINITY;
-    for vertex in own.first_vertex..own.first_vertex + u32::from(own.vertices) {
-        let point = search.motion.point(search.own.vertices[vertex as usize]);
+    let first = own.first_vertex;
+    let points = &search.own.vertices[first as usize..first as usize + usize::from(own.vertices)];
+    for (vertex, &point) in (first..).zip(points) {
+        let point = search.motion.point(point);
         let point32 = point.map(|c| c as f32);
         let lowers = scratch.lowers.len();
         let mut least = (f32::INFINITY, 0);
@@ -185,8 +211,8 @@ fn probes_of_leaf<S: Simd>(
             let lower = bounds.lower(search.simd, point32, search.slack);
             let own = lower.reduce_min();
             if own < least.0 {
-                let lane = kernel::bits(lower.simd_le(own)).trailing_zeros() as usize;
-                least = (own, group * LANES + lane);
+                let lane = lower.simd_le(own).to_bitmask().trailing_zeros() as usize;
+                least = (own, group * WIDE + lane);
             }
             scratch.lowers.push(lower.to_array());
         }
@@ -197,80 +223,116 @@ fn probes_of_leaf<S: Simd>(
         }
         // Without memory begin with the closest box: its triangles usually rule out the others.
         let guess = side.last_leaf(vertex).unwrap_or(near[least.1]);
-        let lowers = lowers as u32;
-        scratch.probes.push(Probe { vertex, point, within, guess, begin, end, lowers, best: None });
+        for (lower, bounds) in scratch.lowers[lowers..].iter_mut().zip(&scratch.bounds) {
+            *lower = bounds.without(kernel::wide(search.simd, lower), guess).to_array();
+        }
+        let index = scratch.probes.len();
+        if scratch.looks.len() <= index {
+            scratch.looks.resize(index + BATCH, Look::default());
+        }
+        scratch.looks[index] = Look { probe: index as u32, leaf: guess, error: 0.0 };
+        let groups = groups as u32;
+        scratch.probes.push(Probe { point, vertex, within, begin, groups, best: Probe::NONE, distance: 0.0 });
     }
     f64::from(closest.sqrt() / ROUNDING)
 }
 
+/// Lists the leaves that are not farther than the closest triangle so far, behind those already looked in. Gives how many looks there are then.
 #[inline(always)]
-fn look_in_guesses<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) {
-    let Scratch { probes, looks, .. } = scratch;
-    looks.clear();
-    for (index, probe) in probes.iter_mut().enumerate() {
-        looks.push(look(search, probe, index as u32, probe.guess));
-    }
-}
-
-/// Looks in all leaves that are not farther than the closest triangle so far.
-#[inline(always)]
-fn look_elsewhere<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) {
+fn elsewhere<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) -> usize {
     let Scratch { probes, lowers, looks, .. } = scratch;
-    for (index, probe) in probes.iter_mut().enumerate() {
-        let near = &search.neighbours.near[probe.begin as usize..probe.end as usize];
-        for (eight, lower) in near.chunks(LANES).zip(&lowers[probe.lowers as usize..]) {
-            let mut mask = kernel::bits(
-                kernel::lanes(search.simd, lower).simd_lt(probe.within * probe.within * ROUNDING),
-            );
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                if eight[lane] != probe.guess {
-                    looks.push(look(search, probe, index as u32, eight[lane]));
+    let mut count = probes.len();
+    let most = count + WIDE * lowers.len();
+    if looks.len() <= most {
+        looks.resize(most + 1, Look::default());
+    }
+    let mut lowers = lowers.iter();
+    for (index, probe) in probes.iter().enumerate() {
+        let limit = probe.within * probe.within * ROUNDING;
+        let mut near = probe.begin;
+        for lower in lowers.by_ref().take(probe.groups as usize) {
+            let mut mask = kernel::wide(search.simd, lower).simd_lt(limit).to_bitmask();
+            // Mostly none or one: written always, kept if there.
+            loop {
+                let leaf = near + mask.trailing_zeros() % WIDE as u32;
+                looks[count] = Look { probe: index as u32, leaf, error: 0.0 };
+                count += usize::from(mask != 0);
+                mask &= mask.wrapping_sub(1);
+                if mask == 0 {
+                    break;
                 }
             }
+            near += WIDE as u32;
         }
     }
+    for look in &mut looks[probes.len()..count] {
+        look.leaf = search.neighbours.near[look.leaf as usize];
+    }
+    count
 }
 
 /// Covers the rounding of squares in single precision.
 const ROUNDING: f32 = 1.0 + 1e-6;
 
-/// Distances of a probe to the triangles of a leaf; lowers the bound of its least distance.
+/// Distances of probes to the triangles of leaves; lowers the bounds of their least distances.
 #[inline(always)]
-fn look<S: Simd>(search: &Search<'_, S>, probe: &mut Probe, index: u32, leaf: u32) -> Look {
-    let block = &search.other.blocks[leaf as usize];
-    let local = [0, 1, 2].map(|k| (probe.point[k] - f64::from(block.origin[k])) as f32);
-    let squared = kernel::squared_distances(search.simd, local, block);
-    let error = block.error + search.error;
-    let nearest = squared.reduce_min().sqrt() + error;
-    probe.within = if nearest < probe.within { nearest } else { probe.within };
-    Look { probe: index, leaf, error, squared: squared.to_array() }
+fn look<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch, range: Range<usize>) {
+    let Scratch { probes, looks, squared, .. } = scratch;
+    if squared.len() < range.end {
+        squared.resize(range.end, [0.0; LANES]);
+    }
+    for (look, result) in looks[range.clone()].iter_mut().zip(&mut squared[range]) {
+        let probe = &mut probes[look.probe as usize];
+        let block = &search.other.blocks[look.leaf as usize];
+        let local = [0, 1, 2].map(|k| (probe.point[k] - f64::from(block.origin[k])) as f32);
+        let squared = kernel::squared_distances(search.simd, local, block);
+        look.error = block.error + search.error;
+        let nearest = squared.reduce_min().sqrt() + look.error;
+        probe.within = if nearest < probe.within { nearest } else { probe.within };
+        *result = squared.to_array();
+    }
 }
 
-/// Gives every probe the exact foot on the closest of the triangles that may be the closest (usually one), the first of equals:
-/// so the result does not depend on where it looked first.
+/// Lists the triangles that may be the closest to their probes (usually one, or those that share a side), of the given number of looks. Gives how many.
 #[inline(always)]
-fn settle<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) {
-    for look in &scratch.looks {
-        let probe = &mut scratch.probes[look.probe as usize];
-        let reach = probe.within + look.error;
-        let own = &search.other.leaves[look.leaf as usize];
-        let mut mask =
-            kernel::bits(kernel::lanes(search.simd, &look.squared).simd_le(reach * reach * ROUNDING))
-                & ((1 << own.triangles) - 1);
-        while mask != 0 {
-            let triangle = own.first_triangle + mask.trailing_zeros();
-            mask &= mask - 1;
-            let foot = feature::foot(probe.point, triangle, search.other);
-            let distance = foot.signed_distance.abs();
-            let closer = probe.best.is_none_or(|(other, held)| {
-                let held = held.signed_distance.abs();
-                distance < held || (distance == held && triangle < other)
-            });
-            if closer && distance < search.tolerance {
-                probe.best = Some((triangle, foot));
+fn candidates<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch, looks: usize) -> usize {
+    let mut count = 0;
+    for (look, squared) in scratch.looks[..looks].iter().zip(&scratch.squared) {
+        if scratch.candidates.len() <= count + LANES {
+            scratch.candidates.resize(2 * count + BATCH, (0, 0));
+        }
+        let reach = scratch.probes[look.probe as usize].within + look.error;
+        let block = &search.other.blocks[look.leaf as usize];
+        let near = kernel::lanes(search.simd, squared).simd_le(reach * reach * ROUNDING);
+        let mut mask = kernel::bits(near) & block.filled;
+        loop {
+            let triangle = block.first_triangle + mask.trailing_zeros() % LANES as u32;
+            scratch.candidates[count] = (look.probe, triangle);
+            count += usize::from(mask != 0);
+            mask &= mask.wrapping_sub(1);
+            if mask == 0 {
+                break;
             }
+        }
+    }
+    count
+}
+
+/// Gives every probe the exact foot on the closest of its candidates, the first of equals: so the result does not depend on where it looked first.
+#[inline(always)]
+fn settle<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch, candidates: usize) {
+    let Scratch { probes, candidates: all, feet, .. } = scratch;
+    for (index, &(probe, triangle)) in all[..candidates].iter().enumerate() {
+        let probe = &mut probes[probe as usize];
+        let foot = feature::foot(probe.point, triangle, search.other);
+        let distance = foot.signed_distance.abs();
+        feet.push(foot);
+        let first = probe.best == Probe::NONE;
+        let closer = first
+            || distance < probe.distance
+            || (distance == probe.distance && triangle < all[probe.best as usize].1);
+        if closer && distance < search.tolerance {
+            (probe.best, probe.distance) = (index as u32, distance);
         }
     }
 }

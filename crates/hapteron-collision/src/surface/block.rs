@@ -23,6 +23,10 @@ pub(crate) struct TriangleBlock {
     pub origin: [f32; 3],
     /// Greatest error of the distance of a point that is on the block, metres; it grows by [`ERROR`] times the distance.
     pub error: f32,
+    /// The triangle in the first lane; those in the next follow it.
+    pub first_triangle: u32,
+    /// One bit for each lane that has a triangle of its own.
+    pub filled: u32,
 }
 
 /// Bound of the accumulated rounding relative to the coordinates: some 20 operations of half a unit in the last place each.
@@ -42,6 +46,8 @@ impl TriangleBlock {
             length: [[0.0; LANES]; 3],
             origin,
             error: 0.0,
+            first_triangle: leaf.first_triangle,
+            filled: (1 << leaf.triangles) - 1,
         };
         for lane in 0..LANES {
             let corners = surface.triangles[leaf.triangle(lane) as usize]
