@@ -1,9 +1,10 @@
 //! Boxes, slabs and corners that the walk holds against each other.
 
+use super::kernel::{LaneMask, Lanes};
 use super::kernel::{bits, lanes, lanes_of};
 use crate::surface::{LANES, Leaf, Node, TriangleBlock};
 use crate::vector::{Rigid, dot};
-use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
+use fearless_simd::{Simd, prelude::*};
 
 /// An axis-aligned box in single precision, rounded outward.
 #[derive(Clone, Copy, Debug)]
@@ -54,8 +55,8 @@ impl Bounds {
 /// Bit `i` is set when child `i` of the node may be within the margin of what is inside the bounds.
 #[inline(always)]
 pub(super) fn children_near<S: Simd>(simd: S, node: &Node, b: &Bounds, margin: f32) -> u32 {
-    let half = f32x8::splat(simd, 0.5);
-    let mut apart = mask32x8::splat(simd, false);
+    let half = Lanes::splat(simd, 0.5);
+    let mut apart = LaneMask::splat(simd, false);
     let mut centers = [half; 3];
     let mut halves = [half; 3];
     for k in 0..3 {
@@ -68,7 +69,7 @@ pub(super) fn children_near<S: Simd>(simd: S, node: &Node, b: &Bounds, margin: f
         return 0;
     }
     // Theirs against the box ...
-    let (mut height, mut reach) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, margin));
+    let (mut height, mut reach) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, margin));
     for k in 0..3 {
         let normal = lanes(simd, &node.normal[k]);
         height += normal * b.center[k];
@@ -77,7 +78,7 @@ pub(super) fn children_near<S: Simd>(simd: S, node: &Node, b: &Bounds, margin: f
     apart |=
         (height - reach).simd_gt(lanes(simd, &node.high)) | (height + reach).simd_lt(lanes(simd, &node.low));
     // ... and the slab against their boxes.
-    let (mut height, mut reach) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, margin));
+    let (mut height, mut reach) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, margin));
     for k in 0..3 {
         height += centers[k] * b.normal[k];
         reach += halves[k] * b.normal[k].abs();
@@ -142,12 +143,12 @@ impl MovedChildren {
             Self { center: [zero; 3], half: [zero; 3], normal: [zero; 3], low: zero, high: zero };
         let (min, max) = (lanes_of(simd, &node.min), lanes_of(simd, &node.max));
         let normal = lanes_of(simd, &node.normal);
-        let mut shift = f32x8::splat(simd, 0.0);
+        let mut shift = Lanes::splat(simd, 0.0);
         for row in 0..3 {
             let r = motion.rotation[row].map(|c| c as f32);
             let t = motion.translation[row] as f32;
-            let mut center = f32x8::splat(simd, t);
-            let (mut half, mut turned) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 0.0));
+            let mut center = Lanes::splat(simd, t);
+            let (mut half, mut turned) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 0.0));
             for k in 0..3 {
                 center += (min[k] + max[k]) * (0.5 * r[k]);
                 half += (max[k] - min[k]) * (0.5 * r[k].abs());
@@ -166,8 +167,8 @@ impl MovedChildren {
     /// Bit `i` is set when child `i` may be within the margin of a leaf.
     #[inline(always)]
     pub(super) fn near<S: Simd>(&self, simd: S, leaf: &Leaf, margin: f32) -> u32 {
-        let mut apart = mask32x8::splat(simd, false);
-        let (mut height, mut reach) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, margin));
+        let mut apart = LaneMask::splat(simd, false);
+        let (mut height, mut reach) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, margin));
         let (mut own_height, mut own_reach) = (height, reach);
         for k in 0..3 {
             let (center, half) = (lanes(simd, &self.center[k]), lanes(simd, &self.half[k]));
@@ -203,7 +204,7 @@ impl MovedChildren {
 #[derive(Clone, Copy)]
 pub(super) struct Corners<S: Simd> {
     /// By corner and axis.
-    at: [[f32x8<S>; 3]; 3],
+    at: [[Lanes<S>; 3]; 3],
     about: [f32; 3],
 }
 
@@ -213,7 +214,7 @@ impl<S: Simd> Corners<S> {
         let about = motion.point(block.origin.map(f64::from)).map(|c| c as f32);
         let (length, third) = (lanes(simd, &block.length[0]), lanes(simd, &block.length[2]));
         let (x, y) = (lanes(simd, &block.third[0]) * third, lanes(simd, &block.third[1]) * third);
-        let mut at = [[f32x8::splat(simd, 0.0); 3]; 3];
+        let mut at = [[Lanes::splat(simd, 0.0); 3]; 3];
         for row in 0..3 {
             let r = motion.rotation[row].map(|c| c as f32);
             let first = heights(&lanes_of(simd, &block.corner), r);
@@ -248,13 +249,13 @@ impl<S: Simd> Corners<S> {
     }
 
     #[inline(always)]
-    fn range(&self, [a, b, c]: [f32x8<S>; 3]) -> (f32, f32) {
+    fn range(&self, [a, b, c]: [Lanes<S>; 3]) -> (f32, f32) {
         (a.min(b).min(c).reduce_min(), a.max(b).max(c).reduce_max())
     }
 }
 
 /// Heights of points along a direction.
 #[inline(always)]
-fn heights<S: Simd>(points: &[f32x8<S>; 3], along: [f32; 3]) -> f32x8<S> {
+fn heights<S: Simd>(points: &[Lanes<S>; 3], along: [f32; 3]) -> Lanes<S> {
     points[0] * along[0] + points[1] * along[1] + points[2] * along[2]
 }

@@ -8,6 +8,7 @@
 use super::Pair;
 use super::feature::{Feature, Foot};
 use super::kernel;
+use super::kernel::Lanes;
 use super::nearest::Nearest;
 use super::result::{Found, Sink};
 use super::ridge_kernel::SegmentBlock;
@@ -17,7 +18,7 @@ use super::vertices::{push_body_vertex, push_obstacle_vertex};
 use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{LANES, Surface};
 use crate::vector::{Rigid, Vec3, add, dot, norm, scale, sub};
-use fearless_simd::{Simd, f32x8, prelude::*};
+use fearless_simd::{Simd, prelude::*};
 use std::ops::Range;
 
 /// Lists to be reused.
@@ -230,7 +231,7 @@ fn cross_leaves<S: Simd>(dive: &Dive<'_, S>, near: &[u32], memory: &mut Memory) 
     if memory.probes.is_empty() {
         return f32::INFINITY;
     }
-    let mut apart = f32x8::splat(dive.simd, f32::INFINITY);
+    let mut apart = Lanes::splat(dive.simd, f32::INFINITY);
     for &index in near {
         let leaf = &dive.other.leaves[index as usize];
         for (eight, block) in memory.segments.iter().enumerate() {

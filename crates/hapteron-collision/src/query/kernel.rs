@@ -1,26 +1,22 @@
 //! The inner loops, eight lanes at a time; every lane is the same IEEE arithmetic on any machine.
 
 use crate::surface::{ERROR, LANES, Node, Surface, TriangleBlock};
-use fearless_simd::{Level, Simd, dispatch, f32x8, f32x16, mask32x8, prelude::*, u32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 
-/// Lanes of the loops over leaves.
-pub(super) const WIDE: usize = 16;
+/// As many numbers as there are lanes, to calculate with.
+pub(super) type Lanes<S> = f32x16<S>;
+/// One truth for each of them.
+pub(super) type LaneMask<S> = mask32x16<S>;
 
 /// Eight numbers to calculate with, by the instructions that `simd` stands for.
 #[inline(always)]
-pub(super) fn lanes<S: Simd>(simd: S, values: &[f32; LANES]) -> f32x8<S> {
-    f32x8::load_array_ref(simd, values)
-}
-
-/// Sixteen numbers.
-#[inline(always)]
-pub(super) fn wide<S: Simd>(simd: S, values: &[f32; WIDE]) -> f32x16<S> {
-    f32x16::load_array_ref(simd, values)
+pub(super) fn lanes<S: Simd>(simd: S, values: &[f32; LANES]) -> Lanes<S> {
+    Lanes::load_array_ref(simd, values)
 }
 
 /// The same by axis.
 #[inline(always)]
-pub(super) fn lanes_of<S: Simd, const N: usize>(simd: S, values: &[[f32; LANES]; N]) -> [f32x8<S>; N] {
+pub(super) fn lanes_of<S: Simd, const N: usize>(simd: S, values: &[[f32; LANES]; N]) -> [Lanes<S>; N] {
     core::array::from_fn(
         #[inline(always)]
         |k| lanes(simd, &values[k]),
@@ -29,7 +25,7 @@ pub(super) fn lanes_of<S: Simd, const N: usize>(simd: S, values: &[[f32; LANES];
 
 /// One bit a lane.
 #[inline(always)]
-pub(super) fn bits<S: Simd>(mask: mask32x8<S>) -> u32 {
+pub(super) fn bits<S: Simd>(mask: LaneMask<S>) -> u32 {
     mask.to_bitmask() as u32
 }
 
@@ -37,32 +33,32 @@ pub(super) fn bits<S: Simd>(mask: mask32x8<S>) -> u32 {
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct LeafBounds {
-    min: [[f32; WIDE]; 3],
-    max: [[f32; WIDE]; 3],
-    normal: [[f32; WIDE]; 3],
-    low: [f32; WIDE],
-    high: [f32; WIDE],
-    leaf: [u32; WIDE],
+    min: [[f32; LANES]; 3],
+    max: [[f32; LANES]; 3],
+    normal: [[f32; LANES]; 3],
+    low: [f32; LANES],
+    high: [f32; LANES],
+    leaf: [u32; LANES],
 }
 
 impl LeafBounds {
     /// Lanes that are infinitely far from everything.
     pub(super) const EMPTY: Self = Self {
-        min: [[f32::INFINITY; WIDE]; 3],
-        max: [[f32::NEG_INFINITY; WIDE]; 3],
-        normal: [[0.0; WIDE]; 3],
-        low: [f32::NEG_INFINITY; WIDE],
-        high: [f32::INFINITY; WIDE],
-        leaf: [u32::MAX; WIDE],
+        min: [[f32::INFINITY; LANES]; 3],
+        max: [[f32::NEG_INFINITY; LANES]; 3],
+        normal: [[0.0; LANES]; 3],
+        low: [f32::NEG_INFINITY; LANES],
+        high: [f32::INFINITY; LANES],
+        leaf: [u32::MAX; LANES],
     };
 
     /// Takes those of the given leaves.
     #[inline(always)]
     pub(super) fn gather(&mut self, surface: &Surface, leaves: &[u32]) {
-        if leaves.len() < WIDE {
+        if leaves.len() < LANES {
             *self = Self::EMPTY;
         }
-        for (lane, &index) in leaves.iter().enumerate().take(WIDE) {
+        for (lane, &index) in leaves.iter().enumerate().take(LANES) {
             let leaf = &surface.leaves[index as usize];
             for axis in 0..3 {
                 self.min[axis][lane] = leaf.min[axis];
@@ -77,34 +73,34 @@ impl LeafBounds {
 
     /// Lower bounds of the squared distances of a point to the leaves.
     #[inline(always)]
-    pub(super) fn lower<S: Simd>(&self, simd: S, p: [f32; 3], slack: f32) -> f32x16<S> {
-        let zero = f32x16::splat(simd, 0.0);
+    pub(super) fn lower<S: Simd>(&self, simd: S, p: [f32; 3], slack: f32) -> Lanes<S> {
+        let zero = Lanes::splat(simd, 0.0);
         let (mut sum, mut height) = (zero, zero);
         for (k, &c) in p.iter().enumerate() {
-            let c = f32x16::splat(simd, c);
-            let (under, over) = (wide(simd, &self.min[k]) - c, c - wide(simd, &self.max[k]));
+            let c = Lanes::splat(simd, c);
+            let (under, over) = (lanes(simd, &self.min[k]) - c, c - lanes(simd, &self.max[k]));
             let beyond = (under.max(over) - slack).max(zero);
             sum += beyond * beyond;
-            height += wide(simd, &self.normal[k]) * c;
+            height += lanes(simd, &self.normal[k]) * c;
         }
-        let (under, over) = (wide(simd, &self.low) - height, height - wide(simd, &self.high));
+        let (under, over) = (lanes(simd, &self.low) - height, height - lanes(simd, &self.high));
         let beyond = (under.max(over) - slack).max(zero);
         (beyond * beyond).max(sum)
     }
 
     /// The same, infinite for one leaf.
     #[inline(always)]
-    pub(super) fn without<S: Simd>(&self, lower: f32x16<S>, leaf: u32) -> f32x16<S> {
+    pub(super) fn without<S: Simd>(&self, lower: Lanes<S>, leaf: u32) -> Lanes<S> {
         let simd = lower.simd;
         let it = u32x16::load_array_ref(simd, &self.leaf).simd_eq(leaf);
-        it.select(f32x16::splat(simd, f32::INFINITY), lower)
+        it.select(Lanes::splat(simd, f32::INFINITY), lower)
     }
 }
 
 /// Lower bounds of the squared distances of a point to a node's children.
 #[inline(always)]
 pub(super) fn children_squared<S: Simd>(simd: S, node: &Node, p: [f32; 3], slack: f32) -> [f32; LANES] {
-    let zero = f32x8::splat(simd, 0.0);
+    let zero = Lanes::splat(simd, 0.0);
     let mut sum = zero;
     for (k, &c) in p.iter().enumerate() {
         let (under, over) = (lanes(simd, &node.min[k]) - c, c - lanes(simd, &node.max[k]));
@@ -116,22 +112,22 @@ pub(super) fn children_squared<S: Simd>(simd: S, node: &Node, p: [f32; 3], slack
 
 /// Scalar products with the vectors of a block.
 #[inline(always)]
-fn parts<S: Simd>(simd: S, axis: &[[f32; LANES]; 3], p: &[f32x8<S>; 3]) -> f32x8<S> {
+fn parts<S: Simd>(simd: S, axis: &[[f32; LANES]; 3], p: &[Lanes<S>; 3]) -> Lanes<S> {
     lanes(simd, &axis[0]) * p[0] + lanes(simd, &axis[1]) * p[1] + lanes(simd, &axis[2]) * p[2]
 }
 
 /// The vector from the first corners of a block's triangles to a point (from the block's origin).
 #[inline(always)]
-fn from_corners<S: Simd>(simd: S, p: [f32; 3], b: &TriangleBlock) -> [f32x8<S>; 3] {
+fn from_corners<S: Simd>(simd: S, p: [f32; 3], b: &TriangleBlock) -> [Lanes<S>; 3] {
     core::array::from_fn(
         #[inline(always)]
-        |k| f32x8::splat(simd, p[k]) - lanes(simd, &b.corner[k]),
+        |k| Lanes::splat(simd, p[k]) - lanes(simd, &b.corner[k]),
     )
 }
 
 /// Squared distances of a point (from the block's origin) to the triangles of a block.
 #[inline(always)]
-pub(super) fn squared_distances<S: Simd>(simd: S, p: [f32; 3], b: &TriangleBlock) -> f32x8<S> {
+pub(super) fn squared_distances<S: Simd>(simd: S, p: [f32; 3], b: &TriangleBlock) -> Lanes<S> {
     let q = from_corners(simd, p, b);
     let (x, y, z) = (parts(simd, &b.along, &q), parts(simd, &b.across, &q), parts(simd, &b.normal, &q));
     let length = lanes_of(simd, &b.length);
@@ -144,14 +140,14 @@ pub(super) fn squared_distances<S: Simd>(simd: S, p: [f32; 3], b: &TriangleBlock
     let side3 = beside(along3, length[2], across3);
     let sides = side1.min(side2).min(side3);
     let over = y.simd_ge(0.0) & across2.simd_le(0.0) & across3.simd_le(0.0);
-    z * z + over.select(f32x8::splat(simd, 0.0), sides)
+    z * z + over.select(Lanes::splat(simd, 0.0), sides)
 }
 
 /// Bit `i` is set when the segment between two points (from the block's origin) may run through triangle `i` of a block.
 #[inline(always)]
 pub(super) fn pierced_triangles<S: Simd>(simd: S, [p, q]: [[f32; 3]; 2], b: &TriangleBlock) -> u32 {
     let reach: f32 = (0..3).map(|k| p[k].abs() + q[k].abs()).sum();
-    let error = f32x8::splat(simd, b.error + ERROR * reach);
+    let error = Lanes::splat(simd, b.error + ERROR * reach);
     let (from, to) = (from_corners(simd, p, b), from_corners(simd, q, b));
     let (z, to_z) = (parts(simd, &b.normal, &from), parts(simd, &b.normal, &to));
     let apart = z.min(to_z).simd_gt(error) | z.max(to_z).simd_lt(-error);
@@ -175,7 +171,7 @@ pub(super) fn pierced_triangles<S: Simd>(simd: S, [p, q]: [[f32; 3]; 2], b: &Tri
 
 /// Squared distance in the plane to a side, from the coordinates along and across it.
 #[inline(always)]
-fn beside<S: Simd>(along: f32x8<S>, length: f32x8<S>, across: f32x8<S>) -> f32x8<S> {
+fn beside<S: Simd>(along: Lanes<S>, length: Lanes<S>, across: Lanes<S>) -> Lanes<S> {
     let beyond = (-along).max(along - length).max(0.0);
     beyond * beyond + across * across
 }
@@ -190,11 +186,7 @@ pub(crate) fn point_triangles(level: Level, p: [f32; 3], b: &TriangleBlock) -> [
 #[inline(always)]
 pub(crate) fn least(values: &[f32; LANES]) -> f32 {
     let lesser = |a: f32, b: f32| if a < b { a } else { b };
-    let mut half = [0.0; 4];
-    for l in 0..4 {
-        half[l] = lesser(values[l], values[l + 4]);
-    }
-    lesser(lesser(half[0], half[2]), lesser(half[1], half[3]))
+    values.iter().fold(f32::INFINITY, |a, &b| lesser(b, a))
 }
 
 /// Bit `i` is set when value `i` is at most `limit`.

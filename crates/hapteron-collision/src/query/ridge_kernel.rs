@@ -1,10 +1,11 @@
 //! The inner loops over edges, eight at a time; like those of the kernel, but in single precision throughout: what they
 //! let through is looked at again exactly, and what they refuse is certain.
 
+use super::kernel::{LaneMask, Lanes};
 use super::kernel::{bits, lanes, lanes_of};
 use super::ridge_store::RidgeBlock;
 use crate::surface::{Cone, LANES, Leaf};
-use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
+use fearless_simd::{Simd, prelude::*};
 
 /// Bound of the accumulated rounding relative to the magnitudes of the factors: some 20 operations of half a unit in the last
 /// place each, and the rounding of what they start from.
@@ -31,18 +32,18 @@ impl SegmentBlock {
 
     /// Lower bounds of the distances to a leaf; not positive where they may meet its bounds.
     #[inline(always)]
-    pub(super) fn apart<S: Simd>(&self, simd: S, leaf: &Leaf, slack: f32) -> f32x8<S> {
-        let mut apart = f32x8::splat(simd, f32::NEG_INFINITY);
-        let mut heights = [f32x8::splat(simd, 0.0); 2];
+    pub(super) fn apart<S: Simd>(&self, simd: S, leaf: &Leaf, slack: f32) -> Lanes<S> {
+        let mut apart = Lanes::splat(simd, f32::NEG_INFINITY);
+        let mut heights = [Lanes::splat(simd, 0.0); 2];
         for k in 0..3 {
             let (a, b) = (lanes(simd, &self.ends[0][k]), lanes(simd, &self.ends[1][k]));
-            apart = apart.max(f32x8::splat(simd, leaf.min[k]) - a.max(b)).max(a.min(b) - leaf.max[k]);
-            let normal = f32x8::splat(simd, leaf.normal[k]);
+            apart = apart.max(Lanes::splat(simd, leaf.min[k]) - a.max(b)).max(a.min(b) - leaf.max[k]);
+            let normal = Lanes::splat(simd, leaf.normal[k]);
             heights[0] += normal * a;
             heights[1] += normal * b;
         }
         let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
-        apart.max(f32x8::splat(simd, leaf.low) - high).max(low - leaf.high) - slack
+        apart.max(Lanes::splat(simd, leaf.low) - high).max(low - leaf.high) - slack
     }
 }
 
@@ -156,27 +157,27 @@ pub(super) fn meeting<S: Simd>(simd: S, one: &OneRidge, block: &RidgeBlock, with
 }
 
 #[inline(always)]
-fn sine<S: Simd>(cos: f32x8<S>) -> f32x8<S> {
+fn sine<S: Simd>(cos: Lanes<S>) -> Lanes<S> {
     (-(cos * cos) + 1.0).max(0.0).sqrt()
 }
 
 /// [`Cone::faces`] for eight cones.
 #[inline(always)]
-fn facing<S: Simd>(cos: f32x8<S>, sin: f32x8<S>, axes: [f32x8<S>; 3], cone: &Cone) -> mask32x8<S> {
+fn facing<S: Simd>(cos: Lanes<S>, sin: Lanes<S>, axes: [Lanes<S>; 3], cone: &Cone) -> LaneMask<S> {
     let aligned = dot(splat(cos.simd, cone.axis), axes);
     (cos + cone.cos).simd_le(0.0) | aligned.simd_le(sin * cone.sin - cos * cone.cos + Cone::SLACK)
 }
 
 #[inline(always)]
-fn splat<S: Simd>(simd: S, v: [f32; 3]) -> [f32x8<S>; 3] {
+fn splat<S: Simd>(simd: S, v: [f32; 3]) -> [Lanes<S>; 3] {
     core::array::from_fn(
         #[inline(always)]
-        |k| f32x8::splat(simd, v[k]),
+        |k| Lanes::splat(simd, v[k]),
     )
 }
 
 #[inline(always)]
-fn dot<S: Simd>(a: [f32x8<S>; 3], b: [f32x8<S>; 3]) -> f32x8<S> {
+fn dot<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> Lanes<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 

@@ -3,6 +3,7 @@
 use super::Pair;
 use super::feature::Feature;
 use super::kernel;
+use super::kernel::Lanes;
 use super::result::{Found, Sink};
 use super::ridge_kernel::{MovedRidges, meeting};
 use super::ridge_store::{RidgeBlock, RidgeStore};
@@ -10,7 +11,7 @@ use super::side::{Clear, Side};
 use super::walk::Neighbours;
 use crate::surface::{Cone, Edge, EdgeKind, LANES, Leaf, Surface};
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or};
-use fearless_simd::{Simd, f32x8, prelude::*};
+use fearless_simd::{Simd, prelude::*};
 
 /// Slack of the test whether a direction lies in an edge's normal cone (its cosine; the cones are in single precision).
 const CONE_SLACK: f64 = Cone::SLACK as f64;
@@ -155,7 +156,7 @@ fn of_leaf<S: Simd>(
     let own = move_ridges(simd, store.of(pair.body, index), &pair.rotation32(), origin32, own);
     let axis = pair.motion.direction(leaf.ridge_cone.axis.map(f64::from));
     let cone = Cone { axis: [axis[0] as f32, axis[1] as f32, axis[2] as f32], ..leaf.ridge_cone };
-    let mut lower = f32x8::splat(simd, f32::INFINITY);
+    let mut lower = Lanes::splat(simd, f32::INFINITY);
     for &other in near {
         let theirs = &pair.obstacle.leaves[other as usize];
         let facing = theirs.ridges > 0 && cone.faces_cone(&theirs.ridge_cone);

@@ -2,7 +2,7 @@
 
 use super::Pair;
 use super::feature::{self, Feature, Foot};
-use super::kernel::{self, LeafBounds, WIDE};
+use super::kernel::{self, LeafBounds};
 use super::result::{Found, Sink};
 use super::side::{Clear, Side};
 use super::walk::{Neighbourhood, Neighbours};
@@ -35,7 +35,7 @@ pub(super) struct Scratch {
     bounds: Vec<LeafBounds>,
     probes: Vec<Probe>,
     /// By probe and group of its neighbourhood: lower bounds of the squared distances, infinite for the leaf looked in first.
-    lowers: Vec<[f32; WIDE]>,
+    lowers: Vec<[f32; LANES]>,
     /// Which probes look in which leaves: first each one where it may be closest, then wherever else it must. Longer than what is in use, as the lists that follow.
     looks: Vec<Look>,
     squared: Vec<[f32; LANES]>,
@@ -189,11 +189,11 @@ fn probes_of_leaf<S: Simd>(
 ) -> f64 {
     let &Neighbourhood { leaf, begin, end } = of;
     let near = &search.neighbours.near[begin as usize..end as usize];
-    let groups = near.len().div_ceil(WIDE);
+    let groups = near.len().div_ceil(LANES);
     if scratch.bounds.len() < groups {
         scratch.bounds.resize(groups, LeafBounds::EMPTY);
     }
-    for (bounds, some) in scratch.bounds.iter_mut().zip(near.chunks(WIDE)) {
+    for (bounds, some) in scratch.bounds.iter_mut().zip(near.chunks(LANES)) {
         bounds.gather(search.other, some);
     }
     let within = (search.tolerance as f32).next_up();
@@ -212,7 +212,7 @@ fn probes_of_leaf<S: Simd>(
             let own = lower.reduce_min();
             if own < least.0 {
                 let lane = lower.simd_le(own).to_bitmask().trailing_zeros() as usize;
-                least = (own, group * WIDE + lane);
+                least = (own, group * LANES + lane);
             }
             scratch.lowers.push(lower.to_array());
         }
@@ -224,7 +224,7 @@ fn probes_of_leaf<S: Simd>(
         // Without memory begin with the closest box: its triangles usually rule out the others.
         let guess = side.last_leaf(vertex).unwrap_or(near[least.1]);
         for (lower, bounds) in scratch.lowers[lowers..].iter_mut().zip(&scratch.bounds) {
-            *lower = bounds.without(kernel::wide(search.simd, lower), guess).to_array();
+            *lower = bounds.without(kernel::lanes(search.simd, lower), guess).to_array();
         }
         let index = scratch.probes.len();
         if scratch.looks.len() <= index {
@@ -242,7 +242,7 @@ fn probes_of_leaf<S: Simd>(
 fn elsewhere<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) -> usize {
     let Scratch { probes, lowers, looks, .. } = scratch;
     let mut count = probes.len();
-    let most = count + WIDE * lowers.len();
+    let most = count + LANES * lowers.len();
     if looks.len() <= most {
         looks.resize(most + 1, Look::default());
     }
@@ -251,10 +251,10 @@ fn elsewhere<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) -> usize {
         let limit = probe.within * probe.within * ROUNDING;
         let mut near = probe.begin;
         for lower in lowers.by_ref().take(probe.groups as usize) {
-            let mut mask = kernel::wide(search.simd, lower).simd_lt(limit).to_bitmask();
+            let mut mask = kernel::lanes(search.simd, lower).simd_lt(limit).to_bitmask();
             // Mostly none or one: written always, kept if there.
             loop {
-                let leaf = near + mask.trailing_zeros() % WIDE as u32;
+                let leaf = near + mask.trailing_zeros() % LANES as u32;
                 looks[count] = Look { probe: index as u32, leaf, error: 0.0 };
                 count += usize::from(mask != 0);
                 mask &= mask.wrapping_sub(1);
@@ -262,7 +262,7 @@ fn elsewhere<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) -> usize {
                     break;
                 }
             }
-            near += WIDE as u32;
+            near += LANES as u32;
         }
     }
     for look in &mut looks[probes.len()..count] {

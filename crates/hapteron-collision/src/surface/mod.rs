@@ -10,7 +10,7 @@ pub(crate) use block::{ERROR, TriangleBlock};
 use crate::mesh::TriMesh;
 
 /// Triangles in one leaf of the tree, and lanes of one inner loop.
-pub(crate) const LANES: usize = 8;
+pub(crate) const LANES: usize = 16;
 /// Marks a child of a [`Node`] as a leaf; the other bits are its index.
 pub(crate) const LEAF: u32 = 1 << 31;
 /// Marks an absent child of a [`Node`].
