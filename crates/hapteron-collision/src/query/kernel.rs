@@ -1,10 +1,11 @@
 //! The inner loops, eight lanes at a time; every lane is the same IEEE arithmetic on any machine.
 
-use crate::surface::{ERROR, LANES, Node, Surface, TriangleBlock};
+use crate::surface::{ERROR, LANES, Leaf, Node, TriangleBlock};
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 
 /// As many numbers as there are lanes, to calculate with.
 pub(super) type Lanes<S> = f32x16<S>;
+pub(super) type LaneNumbers<S> = u32x16<S>;
 /// One truth for each of them.
 pub(super) type LaneMask<S> = mask32x16<S>;
 
@@ -29,72 +30,46 @@ pub(super) fn bits<S: Simd>(mask: LaneMask<S>) -> u32 {
     mask.to_bitmask() as u32
 }
 
-/// Boxes and slabs of up to sixteen leaves, by lane.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(64))]
-pub(super) struct LeafBounds {
-    min: [[f32; LANES]; 3],
-    max: [[f32; LANES]; 3],
-    normal: [[f32; LANES]; 3],
-    low: [f32; LANES],
-    high: [f32; LANES],
-    leaf: [u32; LANES],
+/// Puts the values of the lanes that are set one after the other into a list from its place number `count` on, which must have room for all
+/// lanes, without a branch. Gives the count with them.
+#[inline(always)]
+pub(super) fn append<S: Simd>(
+    list: &mut [u32],
+    count: usize,
+    values: LaneNumbers<S>,
+    set: LaneMask<S>,
+) -> usize {
+    if let Some(room) = list[count..].first_chunk_mut() {
+        *room = values.compress(set).to_array();
+    }
+    count + set.to_bitmask().count_ones() as usize
 }
 
-impl LeafBounds {
-    /// Lanes that are infinitely far from everything.
-    pub(super) const EMPTY: Self = Self {
-        min: [[f32::INFINITY; LANES]; 3],
-        max: [[f32::NEG_INFINITY; LANES]; 3],
-        normal: [[0.0; LANES]; 3],
-        low: [f32::NEG_INFINITY; LANES],
-        high: [f32::INFINITY; LANES],
-        leaf: [u32::MAX; LANES],
-    };
-
-    /// Takes those of the given leaves.
-    #[inline(always)]
-    pub(super) fn gather(&mut self, surface: &Surface, leaves: &[u32]) {
-        if leaves.len() < LANES {
-            *self = Self::EMPTY;
-        }
-        for (lane, &index) in leaves.iter().enumerate().take(LANES) {
-            let leaf = &surface.leaves[index as usize];
-            for axis in 0..3 {
-                self.min[axis][lane] = leaf.min[axis];
-                self.max[axis][lane] = leaf.max[axis];
-                self.normal[axis][lane] = leaf.normal[axis];
-            }
-            self.low[lane] = leaf.low;
-            self.high[lane] = leaf.high;
-            self.leaf[lane] = index;
-        }
+/// The numbers of the lanes.
+pub(super) const NUMBERS: [u32; LANES] = {
+    let mut numbers = [0; LANES];
+    let mut lane = 0;
+    while lane < LANES {
+        numbers[lane] = lane as u32;
+        lane += 1;
     }
+    numbers
+};
 
-    /// Lower bounds of the squared distances of a point to the leaves.
-    #[inline(always)]
-    pub(super) fn lower<S: Simd>(&self, simd: S, p: [f32; 3], slack: f32) -> Lanes<S> {
-        let zero = Lanes::splat(simd, 0.0);
-        let (mut sum, mut height) = (zero, zero);
-        for (k, &c) in p.iter().enumerate() {
-            let c = Lanes::splat(simd, c);
-            let (under, over) = (lanes(simd, &self.min[k]) - c, c - lanes(simd, &self.max[k]));
-            let beyond = (under.max(over) - slack).max(zero);
-            sum += beyond * beyond;
-            height += lanes(simd, &self.normal[k]) * c;
-        }
-        let (under, over) = (lanes(simd, &self.low) - height, height - lanes(simd, &self.high));
+/// Lower bounds of the squared distances of points, one a lane, to a leaf.
+#[inline(always)]
+pub(super) fn leaf_squared<S: Simd>(simd: S, p: &[Lanes<S>; 3], leaf: &Leaf, slack: f32) -> Lanes<S> {
+    let zero = Lanes::splat(simd, 0.0);
+    let (mut sum, mut height) = (zero, zero);
+    for (k, &c) in p.iter().enumerate() {
+        let (under, over) = (Lanes::splat(simd, leaf.min[k]) - c, c - leaf.max[k]);
         let beyond = (under.max(over) - slack).max(zero);
-        (beyond * beyond).max(sum)
+        sum += beyond * beyond;
+        height += c * leaf.normal[k];
     }
-
-    /// The same, infinite for one leaf.
-    #[inline(always)]
-    pub(super) fn without<S: Simd>(&self, lower: Lanes<S>, leaf: u32) -> Lanes<S> {
-        let simd = lower.simd;
-        let it = u32x16::load_array_ref(simd, &self.leaf).simd_eq(leaf);
-        it.select(Lanes::splat(simd, f32::INFINITY), lower)
-    }
+    let (under, over) = (Lanes::splat(simd, leaf.low) - height, height - leaf.high);
+    let beyond = (under.max(over) - slack).max(zero);
+    (beyond * beyond).max(sum)
 }
 
 /// Lower bounds of the squared distances of a point to a node's children.

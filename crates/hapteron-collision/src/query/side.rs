@@ -1,6 +1,6 @@
 //! What a query finds out about one of the two surfaces.
 
-use crate::surface::Surface;
+use crate::surface::{LANES, Surface};
 
 /// Vertices whose results lie together. Near vertices have close numbers, so few pages are ever used.
 const PAGE: usize = 64;
@@ -73,11 +73,14 @@ impl Side {
         self.signed[page][vertex as usize % PAGE]
     }
 
-    /// The leaf of the other surface that was closest when last asked, a first guess for the next time.
+    /// For some vertices in a row, the leaves of the other surface that were closest when last asked, plus one: first guesses for the next time.
     #[inline(always)]
-    pub(super) fn last_leaf(&self, vertex: u32) -> Option<u32> {
-        let page = self.pages[vertex as usize / PAGE] as usize;
-        self.last[page][vertex as usize % PAGE].checked_sub(1)
+    pub(super) fn last_leaves(&self, first: u32, count: usize) -> [u32; LANES] {
+        let mut result = [0; LANES];
+        for (vertex, last) in (first as usize..).zip(result.iter_mut().take(count)) {
+            *last = self.last[self.pages[vertex / PAGE] as usize][vertex % PAGE];
+        }
+        result
     }
 
     /// Notes the signed distance of a vertex and the leaf where it was found.

@@ -2,14 +2,13 @@
 
 use super::Pair;
 use super::feature::{self, Feature, Foot};
-use super::kernel::{self, LeafBounds};
+use super::kernel::{self, LaneNumbers, Lanes};
 use super::result::{Found, Sink};
 use super::side::{Clear, Side};
 use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{ERROR, LANES, Surface, VertexNormal};
 use crate::vector::{Rigid, Vec3, dot, scale};
 use fearless_simd::{Simd, prelude::*};
-use std::ops::Range;
 
 /// Where the vertices of one surface look for their feet on the other.
 struct Search<'a, S> {
@@ -28,48 +27,60 @@ struct Search<'a, S> {
     error: f32,
 }
 
-/// Memory of the search, kept to be reused.
+/// Memory of the search, kept to be reused. A batch of vertices is searched for at once, as many in a group as there are lanes, each in a
+/// slot of its own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
-    /// Bounds of the leaves in a neighbourhood, by groups.
-    bounds: Vec<LeafBounds>,
-    probes: Vec<Probe>,
-    /// By probe and group of its neighbourhood: lower bounds of the squared distances, infinite for the leaf looked in first.
+    groups: Vec<Group>,
+    /// By group and leaf of its neighbourhood: lower bounds of the squared distances.
     lowers: Vec<[f32; LANES]>,
-    /// Which probes look in which leaves: first each one where it may be closest, then wherever else it must. Longer than what is in use, as the lists that follow.
-    looks: Vec<Look>,
-    squared: Vec<[f32; LANES]>,
-    /// Which triangles may be the closest, by probe, and the feet on them.
-    candidates: Vec<(u32, u32)>,
+    /// By slot; places beyond the last vertex of a group are not used.
+    points: Vec<[Vec3; LANES]>,
+    /// The closest triangle is not farther than this; zero for a vertex that has none within the tolerance.
+    within: Vec<[f32; LANES]>,
+    /// The leaf to look in first.
+    guesses: Vec<[u32; LANES]>,
+    /// The closest foot so far, and its distance.
+    best: Vec<[u32; LANES]>,
+    distances: Vec<[f64; LANES]>,
+    /// Which slots look in which leaves: first each where it may be closest, then wherever else it must.
+    looks: Looks,
+    /// Which triangles may be the closest, by slot, and the feet on them.
+    candidates: Candidates,
     feet: Vec<Foot>,
 }
 
-/// A vertex in search of its foot.
+/// Vertices of one leaf, numbered in a row.
 #[derive(Clone, Copy, Debug)]
-struct Probe {
-    point: Vec3,
-    vertex: u32,
-    /// The closest triangle is not farther than this.
-    within: f32,
-    /// Where its neighbourhood begins in the near leaves, and of how many groups it is.
+struct Group {
+    first_vertex: u32,
+    /// Its neighbourhood, a range of the near leaves.
     begin: u32,
-    groups: u32,
-    /// The closest foot so far, and its distance.
-    best: u32,
-    distance: f64,
+    end: u32,
 }
 
-impl Probe {
-    const NONE: u32 = u32::MAX;
+/// Lists with room for more than is in use, so that whole lanes can be written.
+#[derive(Clone, Debug, Default)]
+struct Looks {
+    count: usize,
+    slot: Vec<u32>,
+    leaf: Vec<u32>,
+    /// Squared distances of the triangles, and how certain these are.
+    squared: Vec<[f32; LANES]>,
+    error: Vec<f32>,
 }
 
-/// A leaf in which a probe looks, and how certain the distances of its triangles are.
-#[derive(Clone, Copy, Debug, Default)]
-struct Look {
-    probe: u32,
-    leaf: u32,
-    error: f32,
+#[derive(Clone, Debug, Default)]
+struct Candidates {
+    count: usize,
+    slot: Vec<u32>,
+    triangle: Vec<u32>,
 }
+
+/// No foot.
+const NONE: u32 = u32::MAX;
+/// So far away that nothing is near, but with a square that is a number.
+const NOWHERE: f32 = 1e15;
 
 /// Gives every vertex of the body within the tolerance its signed distance, and makes its contact.
 #[inline(always)]
@@ -129,8 +140,8 @@ pub(super) fn of_obstacle<S: Simd>(
     );
 }
 
-/// Vertices are searched for in batches of about this many, stage by stage: the same inner loop many times over.
-const BATCH: usize = 64;
+/// Vertices are searched for in batches of so many groups, stage by stage: the same inner loop many times over.
+const BATCH: usize = 12;
 
 #[inline(always)]
 fn run<S: Simd>(
@@ -143,27 +154,31 @@ fn run<S: Simd>(
     for (i, neighbourhood) in search.neighbours.of.iter().enumerate() {
         let clear = side.clear[i].holds(search.travelled, search.tolerance + f64::from(search.slack));
         if !clear {
-            let lower = probes_of_leaf(search, side, scratch, neighbourhood);
+            let lower = groups_of_leaf(search, side, scratch, neighbourhood);
             side.clear[i] = Clear::new(lower, search.travelled);
         }
         let last = i + 1 == search.neighbours.of.len();
-        if scratch.probes.len() < BATCH && !last {
+        if scratch.groups.len() < BATCH && !last {
             continue;
         }
-        let first = scratch.probes.len();
-        look(search, scratch, 0..first);
-        let count = elsewhere(search, scratch);
-        look(search, scratch, first..count);
-        let count = candidates(search, scratch, count);
-        settle(search, scratch, count);
-        for probe in &scratch.probes {
-            if probe.best == Probe::NONE {
-                continue;
+        look(search, scratch, 0);
+        let first = scratch.looks.count;
+        elsewhere(search, scratch);
+        look(search, scratch, first);
+        candidates(search, scratch);
+        settle(search, scratch);
+        for (group, at) in scratch.groups.iter().enumerate() {
+            let best = LaneNumbers::load_array_ref(search.simd, &scratch.best[group]);
+            let mut mask = best.simd_lt(NONE).to_bitmask();
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize % LANES;
+                mask &= mask - 1;
+                let vertex = at.first_vertex + lane as u32;
+                let best = scratch.best[group][lane] as usize;
+                let foot = &scratch.feet[best];
+                side.set(vertex, foot.signed_distance, scratch.candidates.triangle[best] / LANES as u32);
+                push(vertex, scratch.points[group][lane], foot);
             }
-            let (triangle, foot) =
-                (scratch.candidates[probe.best as usize].1, &scratch.feet[probe.best as usize]);
-            side.set(probe.vertex, foot.signed_distance, triangle / LANES as u32);
-            push(probe.vertex, probe.point, foot);
         }
         scratch.forget();
     }
@@ -173,166 +188,196 @@ impl Scratch {
     /// Makes room for the next batch.
     #[inline(always)]
     fn forget(&mut self) {
-        self.probes.clear();
+        self.groups.clear();
         self.lowers.clear();
+        self.points.clear();
+        self.within.clear();
+        self.guesses.clear();
+        self.best.clear();
+        self.distances.clear();
+        self.looks.count = 0;
+        self.candidates.count = 0;
         self.feet.clear();
     }
 }
 
-/// Makes a probe of every vertex of a leaf that may be within the tolerance of a near leaf. Gives a lower bound of the distances.
+impl Looks {
+    /// Makes sure that `more` can be appended.
+    #[inline(always)]
+    fn expect(&mut self, more: usize) {
+        if self.slot.len() < self.count + more {
+            let room = 2 * (self.count + more);
+            self.slot.resize(room, 0);
+            self.leaf.resize(room, 0);
+            self.squared.resize(room, [0.0; LANES]);
+            self.error.resize(room, 0.0);
+        }
+    }
+}
+
+impl Candidates {
+    #[inline(always)]
+    fn expect(&mut self, more: usize) {
+        if self.slot.len() < self.count + more {
+            let room = 2 * (self.count + more);
+            self.slot.resize(room, 0);
+            self.triangle.resize(room, 0);
+        }
+    }
+}
+
+/// Makes groups of the vertices of a leaf, those of them that have one within the tolerance of a near leaf, and looks for these in the likeliest leaf.
+/// Gives a lower bound of the distances.
 #[inline(always)]
-fn probes_of_leaf<S: Simd>(
+fn groups_of_leaf<S: Simd>(
     search: &Search<'_, S>,
     side: &Side,
     scratch: &mut Scratch,
     of: &Neighbourhood,
 ) -> f64 {
+    let simd = search.simd;
     let &Neighbourhood { leaf, begin, end } = of;
     let near = &search.neighbours.near[begin as usize..end as usize];
-    let groups = near.len().div_ceil(LANES);
-    if scratch.bounds.len() < groups {
-        scratch.bounds.resize(groups, LeafBounds::EMPTY);
-    }
-    for (bounds, some) in scratch.bounds.iter_mut().zip(near.chunks(LANES)) {
-        bounds.gather(search.other, some);
-    }
     let within = (search.tolerance as f32).next_up();
     let limit = within * within * ROUNDING;
     let own = &search.own.leaves[leaf as usize];
-    let mut closest = f32::INFINITY;
-    let first = own.first_vertex;
-    let points = &search.own.vertices[first as usize..first as usize + usize::from(own.vertices)];
-    for (vertex, &point) in (first..).zip(points) {
-        let point = search.motion.point(point);
-        let point32 = point.map(|c| c as f32);
-        let lowers = scratch.lowers.len();
-        let mut least = (f32::INFINITY, 0);
-        for (group, bounds) in scratch.bounds[..groups].iter().enumerate() {
-            let lower = bounds.lower(search.simd, point32, search.slack);
-            let own = lower.reduce_min();
-            if own < least.0 {
-                let lane = lower.simd_le(own).to_bitmask().trailing_zeros() as usize;
-                least = (own, group * LANES + lane);
+    let mut closest = Lanes::splat(simd, f32::INFINITY);
+    let all = &search.own.vertices[own.first_vertex as usize..][..usize::from(own.vertices)];
+    for (eight, vertices) in all.chunks(LANES).enumerate() {
+        let first_vertex = own.first_vertex + (eight * LANES) as u32;
+        let mut points = [[0.0; 3]; LANES];
+        let mut at = [[NOWHERE; LANES]; 3];
+        for (lane, &vertex) in vertices.iter().enumerate().take(LANES) {
+            let point = search.motion.point(vertex);
+            points[lane] = point;
+            for k in 0..3 {
+                at[k][lane] = point[k] as f32;
             }
+        }
+        let at = kernel::lanes_of(simd, &at);
+        let first = scratch.lowers.len();
+        let mut least = Lanes::splat(simd, f32::INFINITY);
+        let mut guess = LaneNumbers::splat(simd, 0);
+        for &other in near {
+            let lower = kernel::leaf_squared(simd, &at, &search.other.leaves[other as usize], search.slack);
+            guess = lower.simd_lt(least).select(LaneNumbers::splat(simd, other), guess);
+            least = least.min(lower);
             scratch.lowers.push(lower.to_array());
         }
-        closest = if least.0 < closest { least.0 } else { closest };
-        if !(least.0 < limit) {
-            scratch.lowers.truncate(lowers);
+        closest = closest.min(least);
+        let probes = least.simd_lt(limit);
+        if probes.all_false() {
+            scratch.lowers.truncate(first);
             continue;
         }
         // Without memory begin with the closest box: its triangles usually rule out the others.
-        let guess = side.last_leaf(vertex).unwrap_or(near[least.1]);
-        for (lower, bounds) in scratch.lowers[lowers..].iter_mut().zip(&scratch.bounds) {
-            *lower = bounds.without(kernel::lanes(search.simd, lower), guess).to_array();
-        }
-        let index = scratch.probes.len();
-        if scratch.looks.len() <= index {
-            scratch.looks.resize(index + BATCH, Look::default());
-        }
-        scratch.looks[index] = Look { probe: index as u32, leaf: guess, error: 0.0 };
-        let groups = groups as u32;
-        scratch.probes.push(Probe { point, vertex, within, begin, groups, best: Probe::NONE, distance: 0.0 });
+        let last = side.last_leaves(first_vertex, vertices.len());
+        let last = LaneNumbers::load_array_ref(simd, &last);
+        let guess = last.simd_gt(0).select(last - 1, guess);
+        let slots =
+            LaneNumbers::load_array_ref(simd, &kernel::NUMBERS) + (scratch.groups.len() * LANES) as u32;
+        let looks = &mut scratch.looks;
+        looks.expect(LANES);
+        kernel::append(&mut looks.slot, looks.count, slots, probes);
+        looks.count = kernel::append(&mut looks.leaf, looks.count, guess, probes);
+        scratch.groups.push(Group { first_vertex, begin, end });
+        scratch.points.push(points);
+        scratch.within.push(probes.select(Lanes::splat(simd, within), Lanes::splat(simd, 0.0)).to_array());
+        scratch.guesses.push(guess.to_array());
+        scratch.best.push([NONE; LANES]);
+        scratch.distances.push([f64::INFINITY; LANES]);
     }
-    f64::from(closest.sqrt() / ROUNDING)
+    f64::from(closest.reduce_min().sqrt() / ROUNDING)
 }
 
-/// Lists the leaves that are not farther than the closest triangle so far, behind those already looked in. Gives how many looks there are then.
+/// Lists the other leaves that are not farther than the closest triangle so far.
 #[inline(always)]
-fn elsewhere<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) -> usize {
-    let Scratch { probes, lowers, looks, .. } = scratch;
-    let mut count = probes.len();
-    let most = count + LANES * lowers.len();
-    if looks.len() <= most {
-        looks.resize(most + 1, Look::default());
-    }
-    let mut lowers = lowers.iter();
-    for (index, probe) in probes.iter().enumerate() {
-        let limit = probe.within * probe.within * ROUNDING;
-        let mut near = probe.begin;
-        for lower in lowers.by_ref().take(probe.groups as usize) {
-            let mut mask = kernel::lanes(search.simd, lower).simd_lt(limit).to_bitmask();
-            // Mostly none or one: written always, kept if there.
-            loop {
-                let leaf = near + mask.trailing_zeros() % LANES as u32;
-                looks[count] = Look { probe: index as u32, leaf, error: 0.0 };
-                count += usize::from(mask != 0);
-                mask &= mask.wrapping_sub(1);
-                if mask == 0 {
-                    break;
-                }
+fn elsewhere<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) {
+    let simd = search.simd;
+    let looks = &mut scratch.looks;
+    let mut lowers = scratch.lowers.iter();
+    let mut slots = LaneNumbers::load_array_ref(simd, &kernel::NUMBERS);
+    for (group, (within, guess)) in scratch.groups.iter().zip(scratch.within.iter().zip(&scratch.guesses)) {
+        let within = kernel::lanes(simd, within);
+        let limit = within * within * ROUNDING;
+        let guess = LaneNumbers::load_array_ref(simd, guess);
+        let near = &search.neighbours.near[group.begin as usize..group.end as usize];
+        looks.expect(LANES * (near.len() + 1));
+        for (&leaf, lower) in near.iter().zip(lowers.by_ref()) {
+            let set = kernel::lanes(simd, lower).simd_lt(limit) & guess.simd_ne(leaf);
+            kernel::append(&mut looks.slot, looks.count, slots, set);
+            let all = LaneNumbers::splat(simd, leaf);
+            if let Some(room) = looks.leaf[looks.count..].first_chunk_mut() {
+                *room = all.to_array();
             }
-            near += LANES as u32;
+            looks.count += set.to_bitmask().count_ones() as usize;
         }
+        slots += LANES as u32;
     }
-    for look in &mut looks[probes.len()..count] {
-        look.leaf = search.neighbours.near[look.leaf as usize];
-    }
-    count
 }
 
 /// Covers the rounding of squares in single precision.
 const ROUNDING: f32 = 1.0 + 1e-6;
 
-/// Distances of probes to the triangles of leaves; lowers the bounds of their least distances.
+/// Distances of vertices to the triangles of leaves, from look number `first` on; lowers the bounds of their least distances.
 #[inline(always)]
-fn look<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch, range: Range<usize>) {
-    let Scratch { probes, looks, squared, .. } = scratch;
-    if squared.len() < range.end {
-        squared.resize(range.end, [0.0; LANES]);
-    }
-    for (look, result) in looks[range.clone()].iter_mut().zip(&mut squared[range]) {
-        let probe = &mut probes[look.probe as usize];
-        let block = &search.other.blocks[look.leaf as usize];
-        let local = [0, 1, 2].map(|k| (probe.point[k] - f64::from(block.origin[k])) as f32);
+fn look<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch, first: usize) {
+    let Looks { count, slot, leaf, squared, error } = &mut scratch.looks;
+    let range = first..*count;
+    let lists = slot[range.clone()].iter().zip(&leaf[range.clone()]);
+    for ((&slot, &leaf), (result, error)) in
+        lists.zip(squared[range.clone()].iter_mut().zip(&mut error[range]))
+    {
+        let (group, lane) = (slot as usize / LANES, slot as usize % LANES);
+        let point = &scratch.points[group][lane];
+        let block = &search.other.blocks[leaf as usize];
+        let local = [0, 1, 2].map(|k| (point[k] - f64::from(block.origin[k])) as f32);
         let squared = kernel::squared_distances(search.simd, local, block);
-        look.error = block.error + search.error;
-        let nearest = squared.reduce_min().sqrt() + look.error;
-        probe.within = if nearest < probe.within { nearest } else { probe.within };
+        *error = block.error + search.error;
+        let nearest = squared.reduce_min().sqrt() + *error;
+        let within = &mut scratch.within[group][lane];
+        *within = if nearest < *within { nearest } else { *within };
         *result = squared.to_array();
     }
 }
 
-/// Lists the triangles that may be the closest to their probes (usually one, or those that share a side), of the given number of looks. Gives how many.
+/// Lists the triangles that may be the closest (usually one, or those that share a side).
 #[inline(always)]
-fn candidates<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch, looks: usize) -> usize {
-    let mut count = 0;
-    for (look, squared) in scratch.looks[..looks].iter().zip(&scratch.squared) {
-        if scratch.candidates.len() <= count + LANES {
-            scratch.candidates.resize(2 * count + BATCH, (0, 0));
+fn candidates<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) {
+    let simd = search.simd;
+    let Scratch { looks, candidates, within, .. } = scratch;
+    let numbers = LaneNumbers::load_array_ref(simd, &kernel::NUMBERS);
+    for look in 0..looks.count {
+        let (slot, leaf) = (looks.slot[look], looks.leaf[look]);
+        let reach = within[slot as usize / LANES][slot as usize % LANES] + looks.error[look];
+        let block = &search.other.blocks[leaf as usize];
+        let near = kernel::lanes(simd, &looks.squared[look]).simd_le(reach * reach * ROUNDING);
+        candidates.expect(LANES);
+        let triangles = numbers + block.first_triangle;
+        let near = near & numbers.simd_lt(block.triangles);
+        if let Some(room) = candidates.slot[candidates.count..].first_chunk_mut() {
+            *room = [slot; LANES];
         }
-        let reach = scratch.probes[look.probe as usize].within + look.error;
-        let block = &search.other.blocks[look.leaf as usize];
-        let near = kernel::lanes(search.simd, squared).simd_le(reach * reach * ROUNDING);
-        let mut mask = kernel::bits(near) & block.filled;
-        loop {
-            let triangle = block.first_triangle + mask.trailing_zeros() % LANES as u32;
-            scratch.candidates[count] = (look.probe, triangle);
-            count += usize::from(mask != 0);
-            mask &= mask.wrapping_sub(1);
-            if mask == 0 {
-                break;
-            }
-        }
+        candidates.count = kernel::append(&mut candidates.triangle, candidates.count, triangles, near);
     }
-    count
 }
 
-/// Gives every probe the exact foot on the closest of its candidates, the first of equals: so the result does not depend on where it looked first.
+/// Gives every vertex the exact foot on the closest of its candidates, the first of equals: so the result does not depend on where it looked first.
 #[inline(always)]
-fn settle<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch, candidates: usize) {
-    let Scratch { probes, candidates: all, feet, .. } = scratch;
-    for (index, &(probe, triangle)) in all[..candidates].iter().enumerate() {
-        let probe = &mut probes[probe as usize];
-        let foot = feature::foot(probe.point, triangle, search.other);
+fn settle<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) {
+    let Scratch { candidates, points, best, distances, feet, .. } = scratch;
+    let slots = &candidates.slot[..candidates.count];
+    for (index, (&slot, &triangle)) in slots.iter().zip(&candidates.triangle).enumerate() {
+        let (group, lane) = (slot as usize / LANES, slot as usize % LANES);
+        let foot = feature::foot(points[group][lane], triangle, search.other);
         let distance = foot.signed_distance.abs();
         feet.push(foot);
-        let first = probe.best == Probe::NONE;
-        let closer = first
-            || distance < probe.distance
-            || (distance == probe.distance && triangle < all[probe.best as usize].1);
+        let (best, held) = (&mut best[group][lane], &mut distances[group][lane]);
+        let first = |other: Option<&u32>| other.is_none_or(|&other| triangle < other);
+        let closer =
+            distance < *held || (distance == *held && first(candidates.triangle.get(*best as usize)));
         if closer && distance < search.tolerance {
-            (probe.best, probe.distance) = (index as u32, distance);
+            (*best, *held) = (index as u32, distance);
         }
     }
 }

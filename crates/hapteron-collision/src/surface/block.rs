@@ -25,8 +25,8 @@ pub(crate) struct TriangleBlock {
     pub error: f32,
     /// The triangle in the first lane; those in the next follow it.
     pub first_triangle: u32,
-    /// One bit for each lane that has a triangle of its own.
-    pub filled: u32,
+    /// How many lanes have a triangle of their own.
+    pub triangles: u32,
 }
 
 /// Bound of the accumulated rounding relative to the coordinates: some 20 operations of half a unit in the last place each.
@@ -47,7 +47,7 @@ impl TriangleBlock {
             origin,
             error: 0.0,
             first_triangle: leaf.first_triangle,
-            filled: (1 << leaf.triangles) - 1,
+            triangles: u32::from(leaf.triangles),
         };
         for lane in 0..LANES {
             let corners = surface.triangles[leaf.triangle(lane) as usize]
