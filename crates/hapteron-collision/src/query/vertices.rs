@@ -346,15 +346,16 @@ fn look<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch, first: usize) {
 fn candidates<S: Simd>(search: &Search<'_, S>, scratch: &mut Scratch) {
     let simd = search.simd;
     let Scratch { looks, candidates, within, .. } = scratch;
+    let count = search.other.triangles.len() as u32;
     let numbers = LaneNumbers::load_array_ref(simd, &kernel::NUMBERS);
     for look in 0..looks.count {
         let (slot, leaf) = (looks.slot[look], looks.leaf[look]);
         let reach = within[slot as usize / LANES][slot as usize % LANES] + looks.error[look];
-        let block = &search.other.blocks[leaf as usize];
-        let near = kernel::lanes(simd, &looks.squared[look]).simd_le(reach * reach * ROUNDING);
         candidates.expect(LANES);
-        let triangles = numbers + block.first_triangle;
-        let near = near & numbers.simd_lt(block.triangles);
+        // All leaves but the last are full.
+        let triangles = numbers + leaf * LANES as u32;
+        let near = kernel::lanes(simd, &looks.squared[look]).simd_le(reach * reach * ROUNDING)
+            & triangles.simd_lt(count);
         if let Some(room) = candidates.slot[candidates.count..].first_chunk_mut() {
             *room = [slot; LANES];
         }

@@ -23,10 +23,6 @@ pub(crate) struct TriangleBlock {
     pub origin: [f32; 3],
     /// Greatest error of the distance of a point that is on the block, metres; it grows by [`ERROR`] times the distance.
     pub error: f32,
-    /// The triangle in the first lane; those in the next follow it.
-    pub first_triangle: u32,
-    /// How many lanes have a triangle of their own.
-    pub triangles: u32,
 }
 
 /// Bound of the accumulated rounding relative to the coordinates: some 20 operations of half a unit in the last place each.
@@ -46,8 +42,6 @@ impl TriangleBlock {
             length: [[0.0; LANES]; 3],
             origin,
             error: 0.0,
-            first_triangle: leaf.first_triangle,
-            triangles: u32::from(leaf.triangles),
         };
         for lane in 0..LANES {
             let corners = surface.triangles[leaf.triangle(lane) as usize]
