@@ -21,7 +21,7 @@ use crate::vector::Vec3;
 
 /// Of what the building code makes and how it is written: a new one whenever either changes.
 const fn format_version() -> u32 {
-    1
+    2
 }
 
 /// A node whose hull has no valid surface; it must always be refined.

@@ -118,7 +118,7 @@ pub(crate) fn box_distances(node: &Node, p: [f32; 3], slack: f32) -> [f32; LANES
 }
 
 /// Least squared distance to the triangles of a leaf and its lane, the first of equals: by region as in Ericson,
-/// Real-Time Collision Detection, 5.1.5, with the choice of region as selections, so that eight lanes run side by side.
+/// Real-Time Collision Detection, 5.1.5, with the choice of region as selections, so that all lanes run side by side.
 #[inline(always)]
 fn point_leaf(p: Vec3, surface: &Surface, leaf: &Leaf) -> (f64, usize) {
     let mut corners = [[[0.0; LANES]; 3]; 3];

@@ -1,4 +1,4 @@
-//! The inner loops, eight lanes at a time; every lane is the same IEEE arithmetic on any machine.
+//! The inner loops, sixteen lanes at a time; every lane is the same IEEE arithmetic on any machine.
 
 use crate::surface::{ERROR, LANES, Leaf, Node, TriangleBlock};
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
@@ -9,7 +9,7 @@ pub(super) type LaneNumbers<S> = u32x16<S>;
 /// One truth for each of them.
 pub(super) type LaneMask<S> = mask32x16<S>;
 
-/// Eight numbers to calculate with, by the instructions that `simd` stands for.
+/// Numbers to calculate with, by the instructions that `simd` stands for.
 #[inline(always)]
 pub(super) fn lanes<S: Simd>(simd: S, values: &[f32; LANES]) -> Lanes<S> {
     Lanes::load_array_ref(simd, values)
@@ -157,11 +157,18 @@ pub(crate) fn point_triangles(level: Level, p: [f32; 3], b: &TriangleBlock) -> [
     dispatch!(level, simd => squared_distances(simd, p, b).to_array())
 }
 
-/// The least of eight.
+/// The least of all lanes.
 #[inline(always)]
 pub(crate) fn least(values: &[f32; LANES]) -> f32 {
     let lesser = |a: f32, b: f32| if a < b { a } else { b };
-    values.iter().fold(f32::INFINITY, |a, &b| lesser(b, a))
+    let (mut all, mut half) = (*values, LANES / 2);
+    while half > 0 {
+        for l in 0..half {
+            all[l] = lesser(all[l], all[l + half]);
+        }
+        half /= 2;
+    }
+    all[0]
 }
 
 /// Bit `i` is set when value `i` is at most `limit`.
@@ -176,6 +183,7 @@ mod tests {
     use super::*;
     use crate::mesh::TriMesh;
     use crate::query::feature;
+    use crate::surface::Surface;
 
     /// Would catch a distance in single precision that is farther off than the block says, thin and tiny triangles included: then
     /// the closest triangle could be missed.

@@ -243,8 +243,8 @@ fn groups_of_leaf<S: Simd>(
     let own = &search.own.leaves[leaf as usize];
     let mut closest = Lanes::splat(simd, f32::INFINITY);
     let all = &search.own.vertices[own.first_vertex as usize..][..usize::from(own.vertices)];
-    for (eight, vertices) in all.chunks(LANES).enumerate() {
-        let first_vertex = own.first_vertex + (eight * LANES) as u32;
+    for (group, vertices) in all.chunks(LANES).enumerate() {
+        let first_vertex = own.first_vertex + (group * LANES) as u32;
         let mut points = [[0.0; 3]; LANES];
         let mut at = [[NOWHERE; LANES]; 3];
         for (lane, &vertex) in vertices.iter().enumerate().take(LANES) {

@@ -3,7 +3,7 @@
 use super::{LANES, Leaf, Surface};
 use crate::vector::{Vec3, cross, dot, norm, scale, sub, unit_or_zero};
 
-/// Up to eight triangles, each with a frame of its own: `x` along its first side, `y` across it into the triangle, `z`
+/// Up to sixteen triangles, each with a frame of its own: `x` along its first side, `y` across it into the triangle, `z`
 /// along its normal. Then the distance is one of two dimensions, without a division and however thin the triangle is.
 ///
 /// Single precision, about an origin nearby: what it finds is certain to [`TriangleBlock::error`].

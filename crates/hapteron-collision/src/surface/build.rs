@@ -1,5 +1,5 @@
-//! Building a [`Surface`]: order the triangles into leaves of eight, renumber everything in that order, collapse the
-//! binary tree into an eight-wide one.
+//! Building a [`Surface`]: order the triangles into leaves of sixteen, renumber everything in that order, collapse the
+//! binary tree into one that is sixteen wide.
 
 use super::{Cone, Edge, EdgeKind, LANES, LEAF, Leaf, Node, Surface, TriangleBlock, topology};
 use crate::vector::{Vec3, add, cross, dot, norm, sub, unit_or_zero};
@@ -262,7 +262,7 @@ fn pick<T: Copy>(list: &[T], order: &[u32]) -> Vec<T> {
     order.iter().map(|&i| list[i as usize]).collect()
 }
 
-/// The binary tree with up to eight descendants of each kept branch as its children, largest opened first.
+/// The binary tree with up to sixteen descendants of each kept branch as its children, largest opened first.
 fn collapse(surface: &Surface, branches: &[Branch]) -> Vec<Node> {
     let mut leaf_index = vec![0; branches.len()];
     let mut leaves = 0;

@@ -1,5 +1,5 @@
-//! The frozen query structure of one mesh: triangles in blocks of eight, shared vertices and edges with their
-//! normals, and a flat eight-wide tree of boxes over the blocks. Built once, then never changed.
+//! The frozen query structure of one mesh: triangles in blocks of sixteen, shared vertices and edges with their
+//! normals, and a flat sixteen-wide tree of boxes over the blocks. Built once, then never changed.
 
 mod block;
 mod build;
@@ -125,7 +125,7 @@ impl Leaf {
     }
 }
 
-/// Eight children with their boxes and slabs by axis and lane.
+/// Up to sixteen children with their boxes and slabs by axis and lane.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(crate) struct Node {
