@@ -87,7 +87,6 @@ pub(super) struct Batch {
 impl Batch {
     /// Forgets everything.
     pub(super) fn clear(&mut self) {
-        self.own.resize(BATCH, MovedRidges::EMPTY);
         (self.used, self.filled) = (0, 0);
         self.found.clear();
     }
@@ -101,6 +100,9 @@ impl Batch {
     /// Where the next block of the body comes.
     #[inline(always)]
     pub(super) fn own(&mut self) -> &mut MovedRidges {
+        if self.own.len() == self.used {
+            self.own.push(MovedRidges::EMPTY);
+        }
         &mut self.own[self.used]
     }
 
@@ -165,7 +167,7 @@ impl Batch {
             let item = Work::new(*used, mask, overlap, place.begin());
             let Some(next) = work[end..].first_chunk_mut::<MOST_BLOCKS>() else { break };
             *next = [item, item.after(1), item.after(2)];
-            end += if mask == 0 { 0 } else { place.count() };
+            end += place.count() * usize::from(mask != 0);
         }
         *filled = end;
         *used += 1;
@@ -175,7 +177,7 @@ impl Batch {
     #[inline(always)]
     pub(super) fn meet<S: Simd>(&mut self, simd: S, others: &[RidgeBlock], margins: &Margins) {
         let Self { own, used, work, filled, found, .. } = self;
-        if let (Some(own), Some(work)) = (own.first_chunk::<BATCH>(), work.get_mut(..=*filled)) {
+        if let Some(work) = work.get_mut(..=*filled) {
             // A function of its own: the loop needs all registers.
             simd.vectorize(
                 #[inline(always)]
@@ -193,7 +195,7 @@ impl Batch {
 #[inline(always)]
 fn sift<S: Simd>(
     simd: S,
-    own: &[MovedRidges; BATCH],
+    own: &[MovedRidges],
     work: &mut [Work],
     others: &[RidgeBlock],
     margins: &Margins,
@@ -202,7 +204,7 @@ fn sift<S: Simd>(
     let mut count = 0;
     for i in 0..work.len() - 1 {
         let item = work[i];
-        let [outside, within] = own[item.own() % BATCH].close_to(simd, &others[item.other()], &margins);
+        let [outside, within] = own[item.own()].close_to(simd, &others[item.other()], &margins);
         let item = item.only(outside | within & item.overlap());
         work[count] = item;
         count += usize::from(item.near() != 0);
@@ -214,7 +216,7 @@ fn sift<S: Simd>(
 #[inline(always)]
 fn meet_all<S: Simd>(
     simd: S,
-    own: &[MovedRidges; BATCH],
+    own: &[MovedRidges],
     work: &[Work],
     others: &[RidgeBlock],
     margins: &Margins,
@@ -227,7 +229,7 @@ fn meet_all<S: Simd>(
     while at < end {
         let item = work[at];
         let lane = mask.trailing_zeros() as usize % LANES;
-        let (own, other) = (&own[item.own() % BATCH], &others[item.other()]);
+        let (own, other) = (&own[item.own()], &others[item.other()]);
         let mut hits = meeting(simd, own, lane, item.overlaps(lane), other, &margins);
         // On to the next edge, without a branch for whether it is of the same block.
         let rest = mask & mask.wrapping_sub(1);
