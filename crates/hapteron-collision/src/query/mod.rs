@@ -14,6 +14,7 @@ pub(crate) mod kernel;
 mod nearest;
 mod result;
 mod ridge_kernel;
+mod ridge_pairs;
 mod ridge_store;
 mod ridges;
 mod side;

@@ -1,8 +1,7 @@
-//! The inner loops over edges, eight at a time; like those of the kernel, but in single precision throughout: what they
+//! The inner loops over edges, sixteen at a time; like those of the kernel, but in single precision throughout: what they
 //! let through is looked at again exactly, and what they refuse is certain.
 
-use super::kernel::{LaneMask, Lanes};
-use super::kernel::{bits, lanes, lanes_of};
+use super::kernel::{Lanes, bits, lanes, lanes_of};
 use super::ridge_store::RidgeBlock;
 use crate::surface::{Cone, LANES, Leaf};
 use fearless_simd::{Simd, prelude::*};
@@ -11,7 +10,7 @@ use fearless_simd::{Simd, prelude::*};
 /// place each, and the rounding of what they start from.
 const ERROR: f32 = 3e-6;
 
-/// Up to eight segments.
+/// Up to sixteen segments.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct SegmentBlock {
@@ -33,42 +32,68 @@ impl SegmentBlock {
     /// Lower bounds of the distances to a leaf; not positive where they may meet its bounds.
     #[inline(always)]
     pub(super) fn apart<S: Simd>(&self, simd: S, leaf: &Leaf, slack: f32) -> Lanes<S> {
-        let mut apart = Lanes::splat(simd, f32::NEG_INFINITY);
-        let mut heights = [Lanes::splat(simd, 0.0); 2];
-        for k in 0..3 {
-            let (a, b) = (lanes(simd, &self.ends[0][k]), lanes(simd, &self.ends[1][k]));
-            apart = apart.max(Lanes::splat(simd, leaf.min[k]) - a.max(b)).max(a.min(b) - leaf.max[k]);
-            let normal = Lanes::splat(simd, leaf.normal[k]);
-            heights[0] += normal * a;
-            heights[1] += normal * b;
-        }
-        let (low, high) = (heights[0].min(heights[1]), heights[0].max(heights[1]));
-        apart.max(Lanes::splat(simd, leaf.low) - high).max(low - leaf.high) - slack
+        Segments::new(lanes_of(simd, &self.ends[0]), lanes_of(simd, &self.ends[1])).apart(leaf) - slack
     }
 }
 
-/// Up to eight edges of a leaf of the body in the obstacle's frame: about the leaf's origin, as a start and a vector to the end, with
-/// their normal cones.
+/// Segments with their boxes.
+#[derive(Clone, Copy)]
+pub(super) struct Segments<S: Simd> {
+    ends: [[Lanes<S>; 3]; 2],
+    low: [Lanes<S>; 3],
+    high: [Lanes<S>; 3],
+}
+
+impl<S: Simd> Segments<S> {
+    #[inline(always)]
+    fn new(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> Self {
+        let low = [a[0].min(b[0]), a[1].min(b[1]), a[2].min(b[2])];
+        let high = [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])];
+        Self { ends: [a, b], low, high }
+    }
+
+    /// Lower bounds of the distances to a leaf, rounding aside.
+    #[inline(always)]
+    pub(super) fn apart(&self, leaf: &Leaf) -> Lanes<S> {
+        let simd = self.low[0].simd;
+        let normal = splat(simd, leaf.normal);
+        let (from, to) = (dot(normal, self.ends[0]), dot(normal, self.ends[1]));
+        let mut apart = (Lanes::splat(simd, leaf.low) - from.max(to)).max(from.min(to) - leaf.high);
+        for k in 0..3 {
+            apart = apart.max(Lanes::splat(simd, leaf.min[k]) - self.high[k]).max(self.low[k] - leaf.max[k]);
+        }
+        apart
+    }
+}
+
+/// Up to sixteen edges of a leaf of the body in the obstacle's frame, like [`RidgeBlock`].
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct MovedRidges {
-    /// Where they are in the obstacle's frame.
-    pub segments: SegmentBlock,
     start: [[f32; LANES]; 3],
     along: [[f32; LANES]; 3],
-    normal: [[f32; LANES]; 3],
+    across: [[f32; LANES]; 3],
     cos: [f32; LANES],
-    sin: [f32; LANES],
+    length: [f32; LANES],
+    /// Their boxes.
+    low: [[f32; LANES]; 3],
+    high: [[f32; LANES]; 3],
+    /// How close something on its outside must come to each edge to be looked at.
+    pub within: [f32; LANES],
+    pub first: u32,
 }
 
 impl MovedRidges {
     pub(super) const EMPTY: Self = Self {
-        segments: SegmentBlock::EMPTY,
         start: [[0.0; LANES]; 3],
         along: [[0.0; LANES]; 3],
-        normal: [[0.0; LANES]; 3],
+        across: [[0.0; LANES]; 3],
         cos: [1.0; LANES],
-        sin: [0.0; LANES],
+        length: [0.0; LANES],
+        low: [[0.0; LANES]; 3],
+        high: [[0.0; LANES]; 3],
+        within: [0.0; LANES],
+        first: 0,
     };
 
     /// Takes a block after a rotation; its origin is then at `origin`.
@@ -79,93 +104,135 @@ impl MovedRidges {
         block: &RidgeBlock,
         rotation: &[[f32; 3]; 3],
         origin: [f32; 3],
-    ) {
+    ) -> Segments<S> {
         let (start, along) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
-        let (normal, cos) = (lanes_of(simd, &block.normal), lanes(simd, &block.cos));
+        let (across, length) = (lanes_of(simd, &block.across), lanes(simd, &block.length));
+        let mut ends = [[length; 3]; 2];
         for row in 0..3 {
             let turn = splat(simd, rotation[row]);
-            let (from, to) = (dot(turn, start), dot(turn, along));
-            let first = from + origin[row];
+            let (from, to) = (dot(turn, start) + origin[row], dot(turn, along));
             self.start[row] = from.to_array();
             self.along[row] = to.to_array();
-            self.normal[row] = dot(turn, normal).to_array();
-            self.segments.ends[0][row] = first.to_array();
-            self.segments.ends[1][row] = (first + to).to_array();
+            self.across[row] = dot(turn, across).to_array();
+            ends[0][row] = from;
+            ends[1][row] = from + to * length;
         }
-        (self.cos, self.sin) = (cos.to_array(), sine(cos).to_array());
+        (self.cos, self.length, self.first) = (block.cos, block.length, block.first);
+        let segments = Segments::new(ends[0], ends[1]);
+        for k in 0..3 {
+            self.low[k] = segments.low[k].to_array();
+            self.high[k] = segments.high[k].to_array();
+        }
+        segments
     }
 
-    /// Which edges may touch something with a normal in this cone.
+    /// The normal cones.
     #[inline(always)]
-    pub(super) fn facing<S: Simd>(&self, simd: S, cone: &Cone) -> u32 {
-        let (cos, sin) = (lanes(simd, &self.cos), lanes(simd, &self.sin));
-        bits(facing(cos, sin, lanes_of(simd, &self.normal), cone))
+    pub(super) fn cones<S: Simd>(&self, simd: S) -> Cones<S> {
+        let (across, along) = (lanes_of(simd, &self.across), lanes_of(simd, &self.along));
+        let cos = lanes(simd, &self.cos);
+        Cones { axes: cross(across, along), cos, sin: (-(cos * cos) + 1.0).max(0.0).sqrt() }
     }
 
-    /// The edge of a lane, about an origin that is at `from` as seen from the one of this block.
+    /// Which edges may be close enough to the box of another block, on their outside and otherwise.
     #[inline(always)]
-    pub(super) fn edge(&self, lane: usize, from: [f32; 3]) -> OneRidge {
-        let start = [self.start[0][lane], self.start[1][lane], self.start[2][lane]];
-        let axis = [self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]];
-        OneRidge {
-            start: [start[0] - from[0], start[1] - from[1], start[2] - from[2]],
-            along: [self.along[0][lane], self.along[1][lane], self.along[2][lane]],
-            cone: Cone { axis, cos: self.cos[lane], sin: self.sin[lane] },
+    pub(super) fn close_to<S: Simd>(&self, simd: S, block: &RidgeBlock, margins: &Margins) -> [u32; 2] {
+        let mut apart = Lanes::splat(simd, f32::NEG_INFINITY);
+        for k in 0..3 {
+            let (low, high) = (lanes(simd, &self.low[k]), lanes(simd, &self.high[k]));
+            let (over, under) = (Lanes::splat(simd, block.low[k]) - high, low - block.high[k]);
+            apart = apart.max(over.max(under));
         }
+        let apart = apart - margins.distance;
+        [bits(apart.simd_le(lanes(simd, &self.within))), bits(apart.simd_le(margins.within))]
     }
 }
 
-/// An edge of the body about the origin of a leaf of the obstacle.
+/// Normal cones.
+#[derive(Clone, Copy)]
+pub(super) struct Cones<S: Simd> {
+    axes: [Lanes<S>; 3],
+    cos: Lanes<S>,
+    sin: Lanes<S>,
+}
+
+impl<S: Simd> Cones<S> {
+    /// [`Cone::faces`] for each of them.
+    #[inline(always)]
+    pub(super) fn face(&self, cone: &Cone) -> u32 {
+        let aligned = dot(splat(self.cos.simd, cone.axis), self.axes);
+        let least = self.sin * cone.sin - self.cos * cone.cos + Cone::SLACK;
+        bits((self.cos + cone.cos).simd_le(0.0) | aligned.simd_le(least))
+    }
+}
+
+/// How uncertain the numbers in [`meeting`] are.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct OneRidge {
-    pub start: [f32; 3],
-    pub along: [f32; 3],
-    pub cone: Cone,
+pub(super) struct Margins {
+    /// Of a coordinate, metres.
+    place: f32,
+    /// Of a distance that counts, metres.
+    distance: f32,
+    /// The greatest distance that counts, metres.
+    within: f32,
 }
 
-/// Bit `i` is set when edge `i` of the block may touch the single one: surfaces with these normal cones can touch, the common perpendicular
-/// meets both between their ends, and it is short enough. `far` is no less than any coordinate of either.
-#[inline(always)]
-pub(super) fn meeting<S: Simd>(simd: S, one: &OneRidge, block: &RidgeBlock, within: f32, far: f32) -> u32 {
-    let cos = lanes(simd, &block.cos);
-    let mask = bits(facing(cos, sine(cos), lanes_of(simd, &block.normal), &one.cone));
-    if mask == 0 {
-        return 0;
+impl Margins {
+    /// `far` is no less than any coordinate.
+    pub(super) fn new(far: f32, within: f32) -> Self {
+        Self { place: ERROR * far, distance: ERROR * (far + within), within }
     }
-    let (p, d) = (splat(simd, one.start), splat(simd, one.along));
+}
+
+/// Bit `i` is set when edge `i` of the block may touch the edge in a lane of `own`: surfaces with these normal cones can touch along the common
+/// perpendicular, that meets both edges between their ends, and it is short enough. `overlap`: whether they may have passed each other.
+#[inline(always)]
+pub(super) fn meeting<S: Simd>(
+    simd: S,
+    own: &MovedRidges,
+    lane: usize,
+    overlap: bool,
+    block: &RidgeBlock,
+    margins: &Margins,
+) -> u32 {
+    let (p, d) = (pick(simd, &own.start, lane), pick(simd, &own.along, lane));
     let (start, e) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
     let r = [p[0] - start[0], p[1] - start[1], p[2] - start[2]];
-    let w = [d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]];
-    let (dd, ee) = (dot(d, d), dot(e, e));
-    let (size, lengths) = (dd.sqrt(), ee.sqrt());
-    let (whole, area) = (dot(w, w), size * lengths);
-    // Distance times the root of `whole`.
-    let distance = (dot(r, w).abs() - area * (far * ERROR)).max(0.0);
-    let bound = whole + area * area * ERROR;
-    let mask = bits((distance * distance).simd_le(bound * (within * within * (1.0 + 1e-5)))) & mask;
-    if mask == 0 {
+    let w = cross(d, e);
+    let (whole, offset) = (dot(w, w), dot(r, w));
+    // The sine of the angle between the edges; distances times that are compared.
+    let (sine, distance) = (whole.sqrt(), offset.abs());
+    let close = distance.simd_le(sine * margins.within + margins.distance);
+    // The common perpendicular, one way or the other, must lie in the cone of the one edge and its reverse in the cone of the other.
+    let (a, b) = (dot(e, pick(simd, &own.across, lane)), dot(d, lanes_of(simd, &block.across)));
+    let (a_least, b_least) = (sine * own.cos[lane], sine * lanes(simd, &block.cos));
+    let along = (a - a_least).min(b - b_least).simd_ge(-ERROR);
+    let against = (a + a_least).max(b + b_least).simd_le(ERROR);
+    // Edges whose lines may meet have no direction between them.
+    let touching = distance.simd_le(margins.place);
+    let mask = close & (along | against | touching);
+    if !mask.any_true() {
         return 0;
     }
-    let (b, c, f) = (dot(d, e), dot(d, r), dot(e, r));
+    let beyond = offset.simd_gt(0.0);
+    let outside = (beyond & along) | (!beyond & against);
+    let mut near = outside & distance.simd_le(sine * own.within[lane] + margins.distance);
+    if overlap {
+        near |= close & ((beyond & against) | (!beyond & along));
+    }
     // Where along each edge, times `whole`.
-    let (s, t) = (b * f - c * ee, dd * f - b * c);
-    let area = area * (far * ERROR);
-    let (s_error, t_error) = (area * lengths, area * size);
-    let between =
-        s.simd_gt(-s_error) & s.simd_lt(whole + s_error) & t.simd_gt(-t_error) & t.simd_lt(whole + t_error);
-    bits(between) & mask
+    let (cos, c, f) = (dot(d, e), dot(d, r), dot(e, r));
+    let (s, t) = (cos * f - c, f - cos * c);
+    let error = 2.0 * margins.place;
+    let (s_end, t_end) = (whole * own.length[lane], whole * lanes(simd, &block.length));
+    let between = s.simd_gt(-error) & s.simd_lt(s_end + error) & t.simd_gt(-error) & t.simd_lt(t_end + error);
+    bits(mask & (near | touching) & between)
 }
 
+/// A vector from a lane, to calculate with in all of them.
 #[inline(always)]
-fn sine<S: Simd>(cos: Lanes<S>) -> Lanes<S> {
-    (-(cos * cos) + 1.0).max(0.0).sqrt()
-}
-
-/// [`Cone::faces`] for eight cones.
-#[inline(always)]
-fn facing<S: Simd>(cos: Lanes<S>, sin: Lanes<S>, axes: [Lanes<S>; 3], cone: &Cone) -> LaneMask<S> {
-    let aligned = dot(splat(cos.simd, cone.axis), axes);
-    (cos + cone.cos).simd_le(0.0) | aligned.simd_le(sin * cone.sin - cos * cone.cos + Cone::SLACK)
+fn pick<S: Simd>(simd: S, values: &[[f32; LANES]; 3], lane: usize) -> [Lanes<S>; 3] {
+    splat(simd, [values[0][lane], values[1][lane], values[2][lane]])
 }
 
 #[inline(always)]
@@ -179,6 +246,11 @@ fn splat<S: Simd>(simd: S, v: [f32; 3]) -> [Lanes<S>; 3] {
 #[inline(always)]
 fn dot<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> Lanes<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn cross<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]
@@ -217,7 +289,7 @@ mod tests {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
         };
-        let (mut touching, mut refused) = (0, 0);
+        let (mut touching, mut refused, mut told) = (0, 0, 0);
         for round in 0..200_000 {
             let mut vector = || [number(), number(), number()];
             let (d, mix) = (vector(), vector());
@@ -231,21 +303,33 @@ mod tests {
             let to32 = |v: Vec3| v.map(|c| c as f32);
             let within = 0.01;
             let outward = scale(u, if round % 3 == 0 { 1.0 } else { -1.0 });
-            let mut block = RidgeBlock::EMPTY;
-            let opposite = Cone::wide(to32(scale(outward, -1.0)), 0.999);
-            block.set(0, [to32(other), to32(add(other, e))], opposite.axis, opposite.cos);
-            let cone = Cone::wide(to32(outward), 0.999);
-            let one = OneRidge { start: to32(start), along: to32(d), cone };
+            let mut blocks = [RidgeBlock::EMPTY, RidgeBlock::EMPTY];
+            blocks[0].set(0, [start, add(start, d)], to32(outward), Cone::wide_cos(0.999));
+            blocks[1].set(0, [other, add(other, e)], to32(scale(outward, -1.0)), Cone::wide_cos(0.999));
             let far = (norm(start) + norm(d) + norm(other) + norm(e)) as f32;
-            let hit = dispatch!(Level::new(), simd => meeting(simd, &one, &block, within, far)) & 1;
+            let margins = Margins::new(far, within);
+            let [hit, outside] = dispatch!(Level::new(), simd => {
+                blocks[0].finish(simd, 1, 1e30);
+                blocks[1].finish(simd, 1, f32::NAN);
+                let mut own = MovedRidges::EMPTY;
+                own.set(simd, &blocks[0], &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]);
+                own.within = [within; LANES];
+                let [near, overlapping] = own.close_to(simd, &blocks[1], &margins);
+                let close = near & overlapping & own.cones(simd).face(&Cone::wide(to32(scale(outward, -1.0)), 0.999));
+                [true, false].map(|overlap| close & meeting(simd, &own, 0, overlap, &blocks[1], &margins))
+            });
             let between = s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0;
             if between && gap.abs() < f64::from(within) && norm(u) > 0.5 {
                 touching += 1;
                 assert_eq!(hit, 1, "{round}: {s} {t} {gap}");
+                let passed = (gap > 0.0) == (round % 3 == 0);
+                assert!(passed || outside == 1, "{round}: {s} {t} {gap}");
+                // Passed edges count only where the leaves overlap, unless they are too close to tell.
+                told += u32::from(passed && outside == 0);
             } else if hit == 0 {
                 refused += 1;
             }
         }
-        assert!(touching > 20_000 && refused > 20_000, "{touching} {refused}");
+        assert!(touching > 20_000 && refused > 20_000 && told > 5_000, "{touching} {refused} {told}");
     }
 }

@@ -2,16 +2,15 @@
 
 use super::Pair;
 use super::feature::Feature;
-use super::kernel;
-use super::kernel::Lanes;
 use super::result::{Found, Sink};
-use super::ridge_kernel::{MovedRidges, meeting};
-use super::ridge_store::{RidgeBlock, RidgeStore};
+use super::ridge_kernel::Margins;
+use super::ridge_pairs::{Batch, Candidate};
+use super::ridge_store::{About, RidgeStore};
 use super::side::{Clear, Side};
 use super::walk::Neighbours;
-use crate::surface::{Cone, Edge, EdgeKind, LANES, Leaf, Surface};
+use crate::surface::{Cone, Edge, EdgeKind, LANES, Surface};
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub, unit_or};
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::Simd;
 
 /// Slack of the test whether a direction lies in an edge's normal cone (its cosine; the cones are in single precision).
 const CONE_SLACK: f64 = Cone::SLACK as f64;
@@ -24,17 +23,9 @@ const TOUCHING: f64 = 1e-12;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ridges {
     stores: [RidgeStore; 2],
-    own: Vec<Own>,
+    batch: Batch,
     /// By neighbourhood of the body in the last walk.
     pub clear: Vec<Clear>,
-}
-
-/// Edges of a leaf of the body.
-#[derive(Clone, Debug)]
-struct Own {
-    moved: MovedRidges,
-    /// How close each must come to show more than its ends do, when that has been asked for.
-    within: Option<[f32; LANES]>,
 }
 
 impl Ridges {
@@ -42,26 +33,6 @@ impl Ridges {
     pub(super) fn reset(&mut self, pair: Pair<'_>) {
         self.stores[0].reset(pair.body);
         self.stores[1].reset(pair.obstacle);
-    }
-}
-
-impl Own {
-    #[inline(always)]
-    fn within(&mut self, leaf: &Leaf, eight: usize, reach: impl Fn(u32) -> f64) -> [f32; LANES] {
-        if let Some(within) = self.within {
-            return within;
-        }
-        // No distance is less than that.
-        let mut within = [f32::NEG_INFINITY; LANES];
-        let first = leaf.first_edge + (eight * LANES) as u32;
-        for (edge, within) in (first..leaf.first_edge + u32::from(leaf.ridges)).zip(&mut within) {
-            let reach = reach(edge);
-            if reach > 0.0 {
-                *within = (reach as f32).next_up();
-            }
-        }
-        self.within = Some(within);
-        within
     }
 }
 
@@ -85,17 +56,15 @@ impl Ridge {
 
 /// How close the middle of an edge must come to another edge to show more than its ends do; zero when an end lies inside.
 #[inline(always)]
-fn reach(surface: &Surface, edge: u32, side: &Side, pair: Pair<'_>, least: f64) -> f64 {
-    let [a, b] = surface.edges[edge as usize].vertices;
+fn reach(edge: &Edge, side: &Side, tolerance: f64, least: f64) -> f64 {
+    let [a, b] = edge.vertices;
     let (a, b) = (side.signed_distance(a), side.signed_distance(b));
-    let ends = a.min(b);
-    if ends <= 0.0 {
-        0.0
-    } else if ends.is_finite() {
-        (ends - WORTH * pair.tolerance).max(least).max(f64::MIN_POSITIVE)
-    } else {
-        pair.tolerance
-    }
+    let ends = if a < b { a } else { b };
+    let more = ends - WORTH * tolerance;
+    let more = if more > least { more } else { least };
+    let more = if more > f64::MIN_POSITIVE { more } else { f64::MIN_POSITIVE };
+    let known = if ends < f64::INFINITY { more } else { tolerance };
+    if ends <= 0.0 { 0.0 } else { known }
 }
 
 /// Finds the places where the middles of two edges are closer to each other than their ends are to anything, and those
@@ -111,129 +80,66 @@ pub(super) fn find<S: Simd>(
 ) {
     // Edges may only show more than the vertices did, so the vertices' least distance is what they must beat.
     let least = sink.least.min(pair.tolerance);
-    let first = sink.contacts.len();
-    let Ridges { stores, own, clear } = ridges;
-    stores.iter_mut().for_each(|store| store.expect(neighbours.of.len()));
+    let Ridges { stores, batch, clear } = ridges;
+    batch.clear();
+    let (slack, tolerance) = (pair.slack() as f32, wide(pair.tolerance));
+    let far = pair.body.radius + pair.obstacle.radius + norm(pair.motion.translation);
+    let margins = Margins::new(wide(far), tolerance);
+    let rotation = pair.rotation32();
+    let [store, others] = stores;
+    store.expect(neighbours.of.len());
+    others.expect(neighbours.of.len());
     for (clear, neighbourhood) in clear.iter_mut().zip(&neighbours.of) {
         let leaf = &pair.body.leaves[neighbourhood.leaf as usize];
         if leaf.ridges == 0 || clear.holds(pair.travelled, pair.tolerance) {
             continue;
         }
         let near = &neighbours.near[neighbourhood.begin as usize..neighbourhood.end as usize];
-        let own_reach = |edge| reach(pair.body, edge, sides[0], pair, least);
-        let lower =
-            of_leaf(simd, pair, neighbourhood.leaf, near, stores, own, own_reach, |a, b, crossing| {
-                let within = own_reach(a).min(reach(pair.obstacle, b, sides[1], pair, least));
-                if within > 0.0
-                    && let Some(found) = judge(pair, &Ridge::new(pair, a), b, within, crossing)
-                {
-                    sink.push(found);
+        let origin = pair.motion.point(pair.body.blocks[neighbourhood.leaf as usize].origin.map(f64::from));
+        let origin = [origin[0] as f32, origin[1] as f32, origin[2] as f32];
+        let mut lower = f32::INFINITY;
+        let end = leaf.first_edge + u32::from(leaf.ridges);
+        for block in store.of(simd, pair.body, neighbourhood.leaf, About::Leaf) {
+            if batch.full() {
+                batch.meet(simd, &others.blocks, &margins);
+            }
+            let moved = batch.own().set(simd, block, &rotation, origin);
+            let apart = batch.measure(simd, &moved, pair.obstacle, near) - slack;
+            lower = lower.min(apart);
+            if apart < tolerance {
+                // No distance is less than that of an edge that is not there.
+                let mut within = [f32::NEG_INFINITY; LANES];
+                let edges = &pair.body.edges[block.first as usize..end as usize];
+                for (edge, within) in edges.iter().zip(&mut within) {
+                    let reach = reach(edge, sides[0], pair.tolerance, least);
+                    *within = if reach > 0.0 { wide(reach) } else { f32::NEG_INFINITY };
                 }
-            });
+                batch.own().within = within;
+                batch.add(simd, slack, pair.obstacle, near, others);
+            }
+        }
         *clear = Clear::new(f64::from(lower), pair.travelled);
+    }
+    batch.meet(simd, &others.blocks, &margins);
+    let first = sink.contacts.len();
+    for &Candidate { edges: [a, b], overlap } in &batch.found {
+        let (mine, theirs) = (&pair.body.edges[a as usize], &pair.obstacle.edges[b as usize]);
+        let within =
+            reach(mine, sides[0], pair.tolerance, least).min(reach(theirs, sides[1], pair.tolerance, least));
+        let crossing = if overlap { pair.tolerance } else { 0.0 };
+        if within > 0.0
+            && let Some(found) = judge(pair, &Ridge::new(pair, a), b, within, crossing)
+        {
+            sink.push(found);
+        }
     }
     sink.sort_from(first);
 }
 
-/// Hands on all pairs of edges that may touch, one of a leaf of the body and one of the leaves near it, and up to which distance they may have
-/// passed each other. Gives a lower bound of the distance of any edge from any of the leaves.
+/// A length in single precision, and a little more.
 #[inline(always)]
-fn of_leaf<S: Simd>(
-    simd: S,
-    pair: Pair<'_>,
-    index: u32,
-    near: &[u32],
-    [store, other_store]: &mut [RidgeStore; 2],
-    own: &mut Vec<Own>,
-    reach: impl Fn(u32) -> f64,
-    mut hand_on: impl FnMut(u32, u32, f64),
-) -> f32 {
-    let (slack, tolerance) = (pair.slack() as f32, (pair.tolerance as f32).next_up());
-    let leaf = &pair.body.leaves[index as usize];
-    let block = &pair.body.blocks[index as usize];
-    let (radius, origin) = (block.radius(), pair.motion.point(block.origin.map(f64::from)));
-    let origin32 = [origin[0] as f32, origin[1] as f32, origin[2] as f32];
-    let own = move_ridges(simd, store.of(pair.body, index), &pair.rotation32(), origin32, own);
-    let axis = pair.motion.direction(leaf.ridge_cone.axis.map(f64::from));
-    let cone = Cone { axis: [axis[0] as f32, axis[1] as f32, axis[2] as f32], ..leaf.ridge_cone };
-    let mut lower = Lanes::splat(simd, f32::INFINITY);
-    for &other in near {
-        let theirs = &pair.obstacle.leaves[other as usize];
-        let facing = theirs.ridges > 0 && cone.faces_cone(&theirs.ridge_cone);
-        for (eight, block) in own.iter_mut().enumerate() {
-            let apart = block.moved.segments.apart(simd, theirs, slack);
-            lower = lower.min(apart);
-            if !facing {
-                continue;
-            }
-            let mut mask = kernel::bits(apart.simd_lt(tolerance));
-            if mask != 0 {
-                mask &= block.moved.facing(simd, &theirs.ridge_cone) & RidgeBlock::filled(leaf, eight);
-            }
-            if mask == 0 {
-                continue;
-            }
-            let within = block.within(leaf, eight, &reach);
-            mask &= kernel::bits(apart.simd_lt(kernel::lanes(simd, &within)));
-            let touching = kernel::bits(apart.simd_le(0.0));
-            let block32 = &pair.obstacle.blocks[other as usize];
-            let from = local(origin, block32.origin);
-            let far = from[0].abs() + from[1].abs() + from[2].abs() + 3.0 * (radius + block32.radius());
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                // Edges that have passed each other lie in leaves that overlap.
-                let (crossing, within) =
-                    if touching >> lane & 1 == 1 { (pair.tolerance, tolerance) } else { (0.0, within[lane]) };
-                let ridge = block.moved.edge(lane, from);
-                let number = leaf.first_edge + (eight * LANES + lane) as u32;
-                for (group, blocks) in other_store.of(pair.obstacle, other).iter().enumerate() {
-                    let mask = meeting(simd, &ridge, blocks, within, far) & RidgeBlock::filled(theirs, group);
-                    let first = theirs.first_edge + (group * LANES) as u32;
-                    set_bits(mask, |lane| hand_on(number, first + lane, crossing));
-                }
-            }
-        }
-    }
-    lower.reduce_min()
-}
-
-/// Turns the ridges of a leaf of the body into the obstacle's frame, where the leaf's origin is at `origin`.
-#[inline(always)]
-fn move_ridges<'a, S: Simd>(
-    simd: S,
-    blocks: &[RidgeBlock],
-    rotation: &[[f32; 3]; 3],
-    origin: [f32; 3],
-    own: &'a mut Vec<Own>,
-) -> &'a mut [Own] {
-    if own.len() < blocks.len() {
-        own.resize(blocks.len(), Own { moved: MovedRidges::EMPTY, within: None });
-    }
-    for (own, block) in own.iter_mut().zip(blocks) {
-        own.moved.set(simd, block, rotation, origin);
-        own.within = None;
-    }
-    &mut own[..blocks.len()]
-}
-
-/// Calls a function with the number of each bit that is set, from the lowest.
-#[inline(always)]
-fn set_bits(mut mask: u32, mut call: impl FnMut(u32)) {
-    while mask != 0 {
-        call(mask.trailing_zeros());
-        mask &= mask - 1;
-    }
-}
-
-/// A point in single precision, as seen from another one.
-#[inline(always)]
-fn local(from: Vec3, p: [f32; 3]) -> [f32; 3] {
-    [
-        (f64::from(p[0]) - from[0]) as f32,
-        (f64::from(p[1]) - from[1]) as f32,
-        (f64::from(p[2]) - from[2]) as f32,
-    ]
+fn wide(length: f64) -> f32 {
+    (length * (1.0 + 1e-5)) as f32
 }
 
 /// The contact of two edges, when their common perpendicular is short enough and one that surfaces with these edges can touch along.
@@ -261,6 +167,11 @@ fn judge(pair: Pair<'_>, ridge: &Ridge, other: u32, within: f64, crossing: f64) 
     }
     let features = [Feature::Edge(ridge.index), Feature::Edge(other)];
     if distance < TOUCHING {
+        let [mine, theirs] = [(ridge.outward, mine), (their_outward, theirs)]
+            .map(|(axis, edge)| Cone::wide(axis.map(|c| c as f32), edge.cone));
+        if !mine.faces_cone(&theirs) {
+            return None;
+        }
         let normal = unit_or(sub(ridge.outward, their_outward), cross(d, e));
         return Some(Found {
             point_body: p,

@@ -51,12 +51,6 @@ impl TriangleBlock {
         block
     }
 
-    /// Greatest distance of a corner from the origin.
-    #[inline(always)]
-    pub(crate) fn radius(&self) -> f32 {
-        self.error * (0.5001 / ERROR)
-    }
-
     fn set(&mut self, lane: usize, corners: [Vec3; 3]) {
         let (ab, ac) = (sub(corners[1], corners[0]), sub(corners[2], corners[0]));
         let along = unit_or_zero(ab);
