@@ -19,7 +19,10 @@ impl Bounds {
     /// Length of the diagonal of the box, squared, when that is grown by `margin` on all sides.
     #[inline(always)]
     pub(super) fn extent(&self, margin: f32) -> f32 {
-        self.half.iter().map(|h| 4.0 * (h + margin) * (h + margin)).sum()
+        {
+            let side = [0, 1, 2].map(|k| self.half[k] + margin);
+            4.0 * (side[0] * side[0] + side[1] * side[1] + side[2] * side[2])
+        }
     }
 }
 

@@ -53,28 +53,32 @@ impl List<'_> {
 }
 
 impl Neighbours {
-    /// Where its list ends, with room for so many leaves more.
+    /// Makes room for so many leaves more.
     #[inline(always)]
-    fn end(&mut self, more: usize) -> List<'_> {
-        let len = self.of.last().map_or(0, |of| of.end as usize);
-        if self.near.len() < len + more + LANES {
-            self.near.resize(2 * (len + more + LANES), 0);
+    fn reserve(&mut self, more: usize) {
+        let least = self.len() + more + LANES;
+        if self.near.len() < least {
+            self.near.resize(2 * least, 0);
         }
-        List { near: &mut self.near, len }
+    }
+
+    /// Length of the list, behind which is free room.
+    #[inline(always)]
+    fn len(&self) -> usize {
+        self.of.last().map_or(0, |of| of.end as usize)
     }
 
     /// Ends the list of a leaf that began where the one before it ended.
     #[inline(always)]
-    fn of(&mut self, leaf: u32, end: usize) {
-        let (begin, end) = (self.of.last().map_or(0, |of| of.end), end as u32);
+    fn end(&mut self, leaf: u32, begin: usize, end: usize) {
         if begin != end {
-            self.of.push(Neighbourhood { leaf, begin, end });
+            self.of.push(Neighbourhood { leaf, begin: begin as u32, end: end as u32 });
         }
     }
 
     /// Cuts off what was made room for.
     fn finish(&mut self) {
-        self.near.truncate(self.of.last().map_or(0, |of| of.end as usize));
+        self.near.truncate(self.len());
     }
 }
 
@@ -136,11 +140,11 @@ pub(super) fn walk<S: Simd>(simd: S, pair: Pair<'_>, ahead: f64, walk: &mut Walk
     let Walk { inversion, near, touching, .. } = walk;
     near.body.finish();
     touching.body.finish();
-    inversion.invert(near, pair.obstacle.leaves.len());
+    inversion.invert(simd, near, pair.obstacle.leaves.len());
     // Nobody asks what of the obstacle lies in a body that has no inside.
     touching.obstacle.of.clear();
     if pair.body.closed {
-        inversion.invert(touching, pair.obstacle.leaves.len());
+        inversion.invert(simd, touching, pair.obstacle.leaves.len());
     }
 }
 
@@ -163,9 +167,10 @@ fn descend<S: Simd>(simd: S, pair: Pair<'_>, walk: &mut Walk, margins: Margins) 
             let around = moved.around(simd, leaves);
             let bounds = Bounds { center: around.center, half: around.half, ..frame.bounds };
             gather(simd, pair.obstacle, walk, &frame, &bounds, margins.near);
-            if walk.gathered.count() == 0 {
-                leaves = 0;
-            }
+            let most = walk.gathered.count() * leaves.count_ones() as usize;
+            leaves = if most == 0 { 0 } else { leaves };
+            walk.near.body.reserve(most);
+            walk.touching.body.reserve(most);
             while leaves != 0 {
                 let lane = leaves.trailing_zeros() as usize % LANES;
                 leaves &= leaves - 1;
@@ -278,13 +283,19 @@ fn meet_leaf<S: Simd>(
     let Walk { gathered, close, corners, store, near, touching, .. } = walk;
     corners.take(simd, pair.body, index, store, columns);
     let slab = Slab::of(&pair.body.leaves[index as usize], pair.motion);
-    let more = gathered.count();
-    let mut lists = [near.body.end(more), touching.body.end(more)];
-    let [near_list, touching_list] = &mut lists;
-    gathered.meet(simd, corners, &slab, margins, close, [near_list, touching_list]);
-    let ends = [near_list.len, touching_list.len];
-    near.body.of(index, ends[0]);
-    touching.body.of(index, ends[1]);
+    let (near, touching) = (&mut near.body, &mut touching.body);
+    let begin = [near.len(), touching.len()];
+    let mut lists = [(near, begin[0]), (touching, begin[1])].map(
+        #[inline(always)]
+        |(of, len)| List { near: &mut of.near, len },
+    );
+    gathered.meet(simd, corners, &slab, margins, close, &mut lists);
+    let end = lists.map(
+        #[inline(always)]
+        |list| list.len,
+    );
+    walk.near.body.end(index, begin[0], end[0]);
+    walk.touching.body.end(index, begin[1], end[1]);
 }
 
 /// Greatest distance between the places of any point of a body under two motions; `root` is the first node of its tree.

@@ -45,14 +45,15 @@ impl CornerStore {
         let own = &surface.leaves[leaf as usize];
         let first = own.first_triangle as usize;
         let mut table = [u32::MAX; SLOTS];
-        // Room for one more, which the last may be written to again.
-        let (mut corners, mut count) = ([0; MOST + 1], 0);
-        for &vertex in surface.triangles[first..first + usize::from(own.triangles)].iter().flatten() {
-            // One that is not found again is listed twice, which does no harm.
-            let slot = &mut table[vertex as usize % SLOTS];
-            corners[count] = vertex;
-            count += usize::from(*slot != vertex);
-            *slot = vertex;
+        let (mut corners, mut count) = ([0; SLOTS], 0);
+        for triangle in &surface.triangles[first..first + usize::from(own.triangles)] {
+            for &vertex in triangle {
+                // One that is not found again is listed twice, which does no harm.
+                let slot = &mut table[vertex as usize % SLOTS];
+                corners[count % SLOTS] = vertex;
+                count += usize::from(*slot != vertex);
+                *slot = vertex;
+            }
         }
         corners[count] = corners[0];
         count = count.next_multiple_of(2);

@@ -129,7 +129,7 @@ impl Gathered {
         slab: &Slab,
         margins: super::Margins,
         close: &mut Close,
-        [near, touching]: [&mut super::List<'_>; 2],
+        [near, touching]: &mut [super::List<'_>; 2],
     ) {
         for piece in &self.pieces[..self.used] {
             piece.choose(simd, corners, slab, margins.near, close);

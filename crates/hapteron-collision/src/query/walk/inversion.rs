@@ -1,40 +1,49 @@
 //! Pairs of leaves listed from the other side.
 
+use super::super::kernel::bits;
 use super::{Neighbourhood, Pairs};
+use crate::surface::LANES;
+use fearless_simd::{Simd, prelude::*, u32x8};
+
+/// Leaves in a page: as many as there are bits in a word.
+const PAGE: usize = 64;
 
 /// Memory for listing pairs by leaf of the obstacle; all zero between two uses, so that only what is near costs time.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Inversion {
-    /// By leaf: how often it occurs, then where its next pair goes.
+    /// By leaf, in whole pages: how often it occurs, then where its next pair goes.
     counts: Vec<u32>,
-    /// One bit a leaf: whether it occurs.
-    occurs: Vec<u64>,
+    /// By page: whether any of its leaves occurs.
+    occurs: Vec<bool>,
 }
 
 impl Inversion {
     /// The same pairs by leaf of the obstacle, in the order of its leaves.
     #[inline(always)]
-    pub(super) fn invert(&mut self, pairs: &mut Pairs, leaves: usize) {
+    pub(super) fn invert<S: Simd>(&mut self, simd: S, pairs: &mut Pairs, leaves: usize) {
         let Pairs { body, obstacle } = pairs;
-        self.counts.resize(leaves, 0);
-        self.occurs.resize(leaves.div_ceil(64), 0);
+        self.counts.resize(leaves.next_multiple_of(PAGE), 0);
+        self.occurs.resize(leaves.div_ceil(PAGE), false);
         for &other in &body.near {
             self.counts[other as usize] += 1;
-            self.occurs[other as usize / 64] |= 1 << (other % 64);
+            self.occurs[other as usize / PAGE] = true;
         }
         obstacle.of.clear();
         let mut begin = 0;
-        for (word, occurs) in self.occurs.iter_mut().enumerate() {
-            let mut bits = std::mem::take(occurs);
-            while bits != 0 {
-                let leaf = 64 * word as u32 + bits.trailing_zeros();
-                bits &= bits - 1;
-                let end = begin + std::mem::replace(&mut self.counts[leaf as usize], begin);
-                obstacle.of.push(Neighbourhood { leaf, begin, end });
+        let pages = self.counts.as_chunks_mut::<PAGE>().0.iter_mut().enumerate();
+        for ((number, counts), occurs) in pages.zip(&mut self.occurs) {
+            if !std::mem::take(occurs) {
+                continue;
+            }
+            let mut some = occurring(simd, counts);
+            while some != 0 {
+                let place = some.trailing_zeros();
+                some &= some - 1;
+                let end = begin + std::mem::replace(&mut counts[place as usize % PAGE], begin);
+                obstacle.of.push(Neighbourhood { leaf: (number * PAGE) as u32 + place, begin, end });
                 begin = end;
             }
         }
-        obstacle.near.clear();
         obstacle.near.resize(body.near.len(), 0);
         for &Neighbourhood { leaf, begin, end } in &body.of {
             for &other in &body.near[begin as usize..end as usize] {
@@ -47,4 +56,15 @@ impl Inversion {
             self.counts[of.leaf as usize] = 0;
         }
     }
+}
+
+/// One bit a leaf of a page: whether it occurs.
+#[inline(always)]
+fn occurring<S: Simd>(simd: S, counts: &[u32; PAGE]) -> u64 {
+    let mut result = 0;
+    for (number, counts) in counts.as_chunks::<LANES>().0.iter().enumerate() {
+        let some = u32x8::load_array_ref(simd, counts).simd_gt(0);
+        result |= u64::from(bits(some)) << (LANES * number);
+    }
+    result
 }
