@@ -15,17 +15,6 @@ pub(super) struct Bounds {
     pub high: f32,
 }
 
-impl Bounds {
-    /// Length of the diagonal of the box, squared, when that is grown by `margin` on all sides.
-    #[inline(always)]
-    pub(super) fn extent(&self, margin: f32) -> f32 {
-        {
-            let side = [0, 1, 2].map(|k| self.half[k] + margin);
-            4.0 * (side[0] * side[0] + side[1] * side[1] + side[2] * side[2])
-        }
-    }
-}
-
 /// Which of a node's children are nodes.
 #[inline(always)]
 pub(super) fn nodes<S: Simd>(simd: S, node: &Node) -> mask32x8<S> {
@@ -152,6 +141,17 @@ impl MovedChildren {
         result.low = (lanes(simd, &node.low) + shift).to_array();
         result.high = (lanes(simd, &node.high) + shift).to_array();
         result
+    }
+
+    /// Squared lengths of the diagonals of their boxes when these are grown by `margin` on all sides.
+    #[inline(always)]
+    pub(super) fn extents<S: Simd>(&self, simd: S, margin: f32) -> [f32; LANES] {
+        let mut sum = f32x8::splat(simd, 0.0);
+        for half in &self.half {
+            let side = (lanes(simd, half) + margin) * 2.0;
+            sum += side * side;
+        }
+        sum.to_array()
     }
 
     #[inline(always)]

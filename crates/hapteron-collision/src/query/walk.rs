@@ -179,12 +179,13 @@ fn descend<S: Simd>(simd: S, pair: Pair<'_>, walk: &mut Walk, margins: Margins) 
                 }
             }
         }
+        let extents = moved.extents(simd, margins.near);
         while nodes != 0 {
             let lane = nodes.trailing_zeros() as usize % LANES;
             nodes &= nodes - 1;
             let begin = walk.candidates.len() as u32;
             let bounds = moved.of(lane);
-            refine(simd, pair.obstacle, walk, &frame, &bounds, margins.near);
+            refine(simd, pair.obstacle, walk, &frame, &bounds, extents[lane], margins.near);
             let end = walk.candidates.len() as u32;
             if begin != end {
                 walk.stack.push(Frame { node: node.child[lane], begin, end, bounds });
@@ -215,10 +216,18 @@ fn open<S: Simd>(simd: S, pending: &mut Vec<u32>, count: &mut usize, node: &Node
     *count += bits(mask).count_ones() as usize;
 }
 
-/// Appends to the candidates those children of the frame's that may be within the margin of `b`, opened down to about its size.
+/// Appends to the candidates those children of the frame's that may be within the margin of `b`, opened until the squared diagonals of their
+/// boxes are not longer than `extent`.
 #[inline(always)]
-fn refine<S: Simd>(simd: S, obstacle: &Surface, walk: &mut Walk, frame: &Frame, b: &Bounds, margin: f32) {
-    let extent = b.extent(margin);
+fn refine<S: Simd>(
+    simd: S,
+    obstacle: &Surface,
+    walk: &mut Walk,
+    frame: &Frame,
+    b: &Bounds,
+    extent: f32,
+    margin: f32,
+) {
     let Walk { candidates, pending, .. } = walk;
     let mut count = 0;
     for i in frame.begin as usize..frame.end as usize {
