@@ -2,7 +2,9 @@
 
 use super::super::bounds::{Bounds, Boxes, Slab};
 use super::super::kernel::{bits, lanes};
+use super::Margins;
 use super::corners::Corners;
+use super::lists::List;
 use crate::surface::{LANES, Node};
 use fearless_simd::{Simd, f32x8, mask32x8, prelude::*, u32x8};
 
@@ -127,17 +129,17 @@ impl Gathered {
         simd: S,
         corners: &Corners,
         slab: &Slab,
-        margins: super::Margins,
+        margins: Margins,
         close: &mut Close,
-        [near, touching]: &mut [super::List<'_>; 2],
+        [near, touching]: &mut [List<'_>; 2],
     ) {
         for piece in &self.pieces[..self.used] {
             piece.choose(simd, corners, slab, margins.near, close);
             for eight in 0..close.count.div_ceil(LANES).min(EIGHTS) {
                 let gap = close.gap(simd, eight, corners);
                 let leaves = u32x8::load_array_ref(simd, &close.leaf[eight]);
-                near.append(simd, leaves, gap.simd_le(margins.near));
-                touching.append(simd, leaves, gap.simd_le(margins.touching));
+                near.append(leaves, gap.simd_le(margins.near));
+                touching.append(leaves, gap.simd_le(margins.touching));
             }
         }
     }

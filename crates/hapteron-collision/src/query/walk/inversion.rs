@@ -1,7 +1,7 @@
 //! Pairs of leaves listed from the other side.
 
 use super::super::kernel::bits;
-use super::{Neighbourhood, Pairs};
+use super::lists::{Neighbourhood, Pairs};
 use crate::surface::LANES;
 use fearless_simd::{Simd, prelude::*, u32x8};
 
