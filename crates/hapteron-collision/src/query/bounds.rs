@@ -1,38 +1,9 @@
 //! Boxes, slabs and corners that the walk holds against each other.
 
-use super::kernel::{LaneMask, Lanes};
-use super::kernel::{bits, lanes, lanes_of};
-use crate::surface::{LANES, Leaf, Node, TriangleBlock};
+use super::kernel::{LaneMask, LaneNumbers, Lanes, lanes, lanes_of};
+use crate::surface::{LANES, LEAF, Leaf, Node};
 use crate::vector::{Rigid, dot};
 use fearless_simd::{Simd, prelude::*};
-
-/// An axis-aligned box in single precision, rounded outward.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Box32 {
-    pub min: [f32; 3],
-    pub max: [f32; 3],
-}
-
-impl Box32 {
-    #[inline(always)]
-    pub(super) fn grown(&self, margin: f32) -> Self {
-        let mut result = *self;
-        for k in 0..3 {
-            result.min[k] -= margin;
-            result.max[k] += margin;
-        }
-        result
-    }
-
-    #[inline(always)]
-    pub(super) fn overlaps(&self, min: &[f32; 3], max: &[f32; 3]) -> bool {
-        let mut apart = false;
-        for k in 0..3 {
-            apart |= (self.min[k] > max[k]) | (self.max[k] < min[k]);
-        }
-        !apart
-    }
-}
 
 /// A box and a slab around the same thing, in single precision.
 #[derive(Clone, Copy, Debug)]
@@ -44,85 +15,93 @@ pub(super) struct Bounds {
     pub high: f32,
 }
 
-impl Bounds {
-    /// Length of the diagonal of the box, squared, when that is grown by `margin` on all sides.
-    #[inline(always)]
-    pub(super) fn extent(&self, margin: f32) -> f32 {
-        self.half.iter().map(|h| 4.0 * (h + margin) * (h + margin)).sum()
-    }
+/// Which of a node's children are nodes.
+#[inline(always)]
+pub(super) fn nodes<S: Simd>(simd: S, node: &Node) -> LaneMask<S> {
+    LaneNumbers::load_array_ref(simd, &node.child).simd_lt(LEAF)
 }
 
-/// Bit `i` is set when child `i` of the node may be within the margin of what is inside the bounds.
+/// Which of a node's children are nodes with a box whose squared diagonal is longer than this.
 #[inline(always)]
-pub(super) fn children_near<S: Simd>(simd: S, node: &Node, b: &Bounds, margin: f32) -> u32 {
-    let half = Lanes::splat(simd, 0.5);
-    let mut apart = LaneMask::splat(simd, false);
-    let mut centers = [half; 3];
-    let mut halves = [half; 3];
+pub(super) fn coarse_nodes<S: Simd>(simd: S, node: &Node, extent: f32) -> LaneMask<S> {
+    let mut own = Lanes::splat(simd, 0.0);
     for k in 0..3 {
-        let (min, max) = (lanes(simd, &node.min[k]), lanes(simd, &node.max[k]));
-        let reach = b.half[k] + margin;
-        apart |= min.simd_gt(b.center[k] + reach) | max.simd_lt(b.center[k] - reach);
-        (centers[k], halves[k]) = ((min + max) * half, (max - min) * half);
+        let side = lanes(simd, &node.max[k]) - lanes(simd, &node.min[k]);
+        own += side * side;
     }
-    if apart.all_true() {
-        return 0;
+    own.simd_gt(extent) & nodes(simd, node)
+}
+
+/// Eight boxes with slabs, by axis and lane.
+pub(super) struct Boxes<'a> {
+    pub min: [&'a [f32; LANES]; 3],
+    pub max: [&'a [f32; LANES]; 3],
+    pub normal: [&'a [f32; LANES]; 3],
+    pub low: &'a [f32; LANES],
+    pub high: &'a [f32; LANES],
+}
+
+impl<'a> Boxes<'a> {
+    /// Those of a node's children.
+    #[inline(always)]
+    pub(super) fn of(node: &'a Node) -> Self {
+        Self {
+            min: [&node.min[0], &node.min[1], &node.min[2]],
+            max: [&node.max[0], &node.max[1], &node.max[2]],
+            normal: [&node.normal[0], &node.normal[1], &node.normal[2]],
+            low: &node.low,
+            high: &node.high,
+        }
     }
-    // Theirs against the box ...
-    let (mut height, mut reach) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, margin));
-    for k in 0..3 {
-        let normal = lanes(simd, &node.normal[k]);
-        height += normal * b.center[k];
-        reach += normal.abs() * b.half[k];
+
+    /// Whose boxes may be within the margin of the one of the bounds.
+    #[inline(always)]
+    pub(super) fn touch<S: Simd>(&self, simd: S, b: &Bounds, margin: f32) -> LaneMask<S> {
+        let mut apart = LaneMask::splat(simd, false);
+        for k in 0..3 {
+            let reach = b.half[k] + margin;
+            apart |= lanes(simd, self.min[k]).simd_gt(b.center[k] + reach)
+                | lanes(simd, self.max[k]).simd_lt(b.center[k] - reach);
+        }
+        !apart
     }
-    apart |=
-        (height - reach).simd_gt(lanes(simd, &node.high)) | (height + reach).simd_lt(lanes(simd, &node.low));
-    // ... and the slab against their boxes.
-    let (mut height, mut reach) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, margin));
-    for k in 0..3 {
-        height += centers[k] * b.normal[k];
-        reach += halves[k] * b.normal[k].abs();
+
+    /// Which of them may be within the margin of what is inside the bounds.
+    #[inline(always)]
+    pub(super) fn near<S: Simd>(&self, simd: S, b: &Bounds, margin: f32) -> LaneMask<S> {
+        let zero = Lanes::splat(simd, 0.0);
+        let mut apart = !self.touch(simd, b, margin);
+        // Theirs against the box, and the slab against their boxes.
+        let (mut height, mut reach) = (zero, Lanes::splat(simd, margin));
+        let (mut other_height, mut other_reach) = (zero, reach);
+        for k in 0..3 {
+            let normal = lanes(simd, self.normal[k]);
+            height += normal * b.center[k];
+            reach += normal.abs() * b.half[k];
+            let (min, max) = (lanes(simd, self.min[k]), lanes(simd, self.max[k]));
+            other_height += (min + max) * (0.5 * b.normal[k]);
+            other_reach += (max - min) * (0.5 * b.normal[k].abs());
+        }
+        apart |= (height - reach).simd_gt(lanes(simd, self.high))
+            | (height + reach).simd_lt(lanes(simd, self.low));
+        apart |= (other_height - other_reach).simd_gt(b.high) | (other_height + other_reach).simd_lt(b.low);
+        !apart
     }
-    apart |= (height - reach).simd_gt(b.high) | (height + reach).simd_lt(b.low);
-    bits(!apart)
 }
 
 /// The space between two parallel planes.
 pub(super) struct Slab {
-    normal: [f32; 3],
-    low: f32,
-    high: f32,
+    pub normal: [f32; 3],
+    pub low: f32,
+    pub high: f32,
 }
 
 impl Slab {
-    #[inline(always)]
-    pub(super) fn of_own(leaf: &Leaf) -> Self {
-        Self { normal: leaf.normal, low: leaf.low, high: leaf.high }
-    }
-
     #[inline(always)]
     pub(super) fn of(leaf: &Leaf, motion: &Rigid) -> Self {
         let normal = motion.direction(leaf.normal.map(f64::from));
         let shift = dot(normal, motion.translation) as f32;
         Self { normal: normal.map(|c| c as f32), low: leaf.low + shift, high: leaf.high + shift }
-    }
-
-    /// How far from it things between these heights are; negative when they overlap.
-    #[inline(always)]
-    pub(super) fn apart(&self, (low, high): (f32, f32)) -> f32 {
-        (low - self.high).max(self.low - high)
-    }
-
-    /// True when the box is farther than `margin` from the slab.
-    #[inline(always)]
-    pub(super) fn misses(&self, min: &[f32; 3], max: &[f32; 3], margin: f32) -> bool {
-        let mut center = 0.0;
-        let mut half = margin;
-        for k in 0..3 {
-            center += self.normal[k] * (0.5 * (min[k] + max[k]));
-            half += self.normal[k].abs() * (0.5 * (max[k] - min[k]));
-        }
-        center - half > self.high || center + half < self.low
     }
 }
 
@@ -164,27 +143,15 @@ impl MovedChildren {
         result
     }
 
-    /// Bit `i` is set when child `i` may be within the margin of a leaf.
+    /// Squared lengths of the diagonals of their boxes when these are grown by `margin` on all sides.
     #[inline(always)]
-    pub(super) fn near<S: Simd>(&self, simd: S, leaf: &Leaf, margin: f32) -> u32 {
-        let mut apart = LaneMask::splat(simd, false);
-        let (mut height, mut reach) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, margin));
-        let (mut own_height, mut own_reach) = (height, reach);
-        for k in 0..3 {
-            let (center, half) = (lanes(simd, &self.center[k]), lanes(simd, &self.half[k]));
-            let own = half + margin;
-            apart |= (center + own).simd_lt(leaf.min[k]) | (center - own).simd_gt(leaf.max[k]);
-            // The leaf's slab against the boxes, and the slabs against its box.
-            height += center * leaf.normal[k];
-            reach += half * leaf.normal[k].abs();
-            let normal = lanes(simd, &self.normal[k]);
-            own_height += normal * (0.5 * (leaf.min[k] + leaf.max[k]));
-            own_reach += normal.abs() * (0.5 * (leaf.max[k] - leaf.min[k]));
+    pub(super) fn extents<S: Simd>(&self, simd: S, margin: f32) -> [f32; LANES] {
+        let mut sum = Lanes::splat(simd, 0.0);
+        for half in &self.half {
+            let side = (lanes(simd, half) + margin) * 2.0;
+            sum += side * side;
         }
-        apart |= (height - reach).simd_gt(leaf.high) | (height + reach).simd_lt(leaf.low);
-        let (low, high) = (lanes(simd, &self.low), lanes(simd, &self.high));
-        apart |= (own_height - own_reach).simd_gt(high) | (own_height + own_reach).simd_lt(low);
-        bits(!apart)
+        sum.to_array()
     }
 
     #[inline(always)]
@@ -198,64 +165,19 @@ impl MovedChildren {
             high: self.high[lane],
         }
     }
-}
 
-/// The corners of a block's triangles, about a point, after a rigid motion.
-#[derive(Clone, Copy)]
-pub(super) struct Corners<S: Simd> {
-    /// By corner and axis.
-    at: [[Lanes<S>; 3]; 3],
-    about: [f32; 3],
-}
-
-impl<S: Simd> Corners<S> {
+    /// The box around some of the children, with the slab of no direction, which everything is in.
     #[inline(always)]
-    pub(super) fn moved(simd: S, block: &TriangleBlock, motion: &Rigid) -> Self {
-        let about = motion.point(block.origin.map(f64::from)).map(|c| c as f32);
-        let (length, third) = (lanes(simd, &block.length[0]), lanes(simd, &block.length[2]));
-        let (x, y) = (lanes(simd, &block.third[0]) * third, lanes(simd, &block.third[1]) * third);
-        let mut at = [[Lanes::splat(simd, 0.0); 3]; 3];
-        for row in 0..3 {
-            let r = motion.rotation[row].map(|c| c as f32);
-            let first = heights(&lanes_of(simd, &block.corner), r);
-            let along = heights(&lanes_of(simd, &block.along), r);
-            let across = heights(&lanes_of(simd, &block.across), r);
-            at[0][row] = first;
-            at[1][row] = first + along * length;
-            at[2][row] = first + along * x + across * y;
-        }
-        Self { at, about }
-    }
-
-    /// The box around them.
-    #[inline(always)]
-    pub(super) fn bounds(&self) -> Box32 {
-        let mut result = Box32 { min: [0.0; 3], max: [0.0; 3] };
+    pub(super) fn around<S: Simd>(&self, simd: S, children: u32) -> Bounds {
+        let chosen = LaneMask::from_bitmask(simd, u64::from(children));
+        let none = Lanes::splat(simd, f32::INFINITY);
+        let mut b = Bounds { center: [0.0; 3], half: [0.0; 3], normal: [0.0; 3], low: 0.0, high: 0.0 };
         for k in 0..3 {
-            let (low, high) = self.range([self.at[0][k], self.at[1][k], self.at[2][k]]);
-            result.min[k] = self.about[k] + low;
-            result.max[k] = self.about[k] + high;
+            let (center, half) = (lanes(simd, &self.center[k]), lanes(simd, &self.half[k]));
+            let low = chosen.select(center - half, none).reduce_min();
+            let high = chosen.select(center + half, -none).reduce_max();
+            (b.center[k], b.half[k]) = (0.5 * (low + high), 0.5 * (high - low));
         }
-        result
+        b
     }
-
-    /// Between which heights they lie along a direction.
-    #[inline(always)]
-    pub(super) fn heights(&self, normal: [f32; 3]) -> (f32, f32) {
-        let about: f32 = (0..3).map(|k| self.about[k] * normal[k]).sum();
-        let [a, b, c] = &self.at;
-        let (low, high) = self.range([heights(a, normal), heights(b, normal), heights(c, normal)]);
-        (about + low, about + high)
-    }
-
-    #[inline(always)]
-    fn range(&self, [a, b, c]: [Lanes<S>; 3]) -> (f32, f32) {
-        (a.min(b).min(c).reduce_min(), a.max(b).max(c).reduce_max())
-    }
-}
-
-/// Heights of points along a direction.
-#[inline(always)]
-fn heights<S: Simd>(points: &[Lanes<S>; 3], along: [f32; 3]) -> Lanes<S> {
-    points[0] * along[0] + points[1] * along[1] + points[2] * along[2]
 }

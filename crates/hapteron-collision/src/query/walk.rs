@@ -1,57 +1,34 @@
 //! The walk through both trees: which leaves of the two surfaces come close to each other.
 
+mod corners;
+mod gathered;
+mod inversion;
+mod lists;
+
 use super::Pair;
-use super::bounds::{self, Bounds, Corners, MovedChildren, Slab};
+use super::bounds::{self, Bounds, Boxes, MovedChildren, Slab};
+use super::kernel::{LaneMask, LaneNumbers, bits};
 use crate::surface::{EMPTY, LANES, LEAF, Node, Surface};
 use crate::vector::{Rigid, Vec3, norm};
-use fearless_simd::Simd;
+use corners::{Columns, CornerStore, Corners};
+use fearless_simd::{Simd, prelude::*};
+use gathered::{Close, Gathered};
+use inversion::Inversion;
+use lists::Pairs;
 
-/// A leaf with the leaves of the other surface that come close to it, a range of a list.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Neighbourhood {
-    pub leaf: u32,
-    pub begin: u32,
-    pub end: u32,
-}
-
-/// Leaves of one surface with those of the other that are near, in a fixed order of the first.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Neighbours {
-    pub of: Vec<Neighbourhood>,
-    pub near: Vec<u32>,
-}
-
-/// Pairs of leaves, from both sides.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Pairs {
-    pub body: Neighbours,
-    pub obstacle: Neighbours,
-}
-
-impl Pairs {
-    fn clear(&mut self) {
-        self.body.of.clear();
-        self.body.near.clear();
-    }
-
-    /// Ends the list of a leaf of the body that began at `begin`.
-    #[inline(always)]
-    fn end(&mut self, leaf: u32, begin: usize) {
-        let (begin, end) = (begin as u32, self.body.near.len() as u32);
-        if begin != end {
-            self.body.of.push(Neighbourhood { leaf, begin, end });
-        }
-    }
-}
+pub(super) use lists::{Neighbourhood, Neighbours};
 
 /// Memory of the walk, and its result.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Walk {
     stack: Vec<Frame>,
-    candidates: Vec<u32>,
-    /// By candidate of the frame at hand: which children of the body's node it is near, for all that is known.
-    masks: Vec<u32>,
+    candidates: Vec<Candidate>,
+    /// Nodes of the obstacle to be opened, and free places behind them.
     pending: Vec<u32>,
+    gathered: Gathered,
+    close: Close,
+    corners: Corners,
+    store: CornerStore,
     inversion: Inversion,
     /// Leaves that may be closer than what was asked for.
     pub near: Pairs,
@@ -66,190 +43,196 @@ struct Margins {
     touching: f32,
 }
 
-/// A node of the body's tree with a range of `candidates` that it must be compared with.
+/// A node of the body's tree, and a range of the candidates, which are near it.
 #[derive(Clone, Copy, Debug)]
 struct Frame {
     node: u32,
     begin: u32,
     end: u32,
+    bounds: Bounds,
+}
+
+/// Some children of a node of the obstacle.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    node: u32,
+    /// One bit a child.
+    children: u32,
 }
 
 /// Finds all pairs of leaves that may be closer than the tolerance after the body has travelled a distance of `ahead`.
 #[inline(always)]
 pub(super) fn walk<S: Simd>(simd: S, pair: Pair<'_>, ahead: f64, walk: &mut Walk) {
-    walk.near.clear();
-    walk.touching.clear();
+    walk.near.body.of.clear();
+    walk.touching.body.of.clear();
     walk.candidates.clear();
     walk.stack.clear();
-    if pair.body.nodes.is_empty() || pair.obstacle.nodes.is_empty() {
-        return;
-    }
-    let touching = (ahead + pair.slack()) as f32;
-    let margins = Margins { near: (pair.tolerance + ahead + pair.slack()) as f32, touching };
-    walk.candidates.push(0);
-    walk.stack.push(Frame { node: 0, begin: 0, end: 1 });
-    while let Some(frame) = walk.stack.pop() {
-        walk.candidates.truncate(frame.end as usize);
-        let node = &pair.body.nodes[frame.node as usize];
-        let children = MovedChildren::new(simd, node, pair.motion);
-        walk.masks.clear();
-        for &candidate in &walk.candidates[frame.begin as usize..] {
-            walk.masks.push(match candidate & LEAF {
-                0 => u32::MAX,
-                _ => children.near(simd, &pair.obstacle.leaves[(candidate & !LEAF) as usize], margins.near),
-            });
-        }
-        for lane in 0..LANES {
-            let child = node.child[lane];
-            if child == EMPTY {
-                continue;
-            }
-            let begin = walk.candidates.len() as u32;
-            let bounds = children.of(lane);
-            refine(simd, pair.obstacle, walk, frame, lane, &bounds, margins.near, child & LEAF != 0);
-            let end = walk.candidates.len() as u32;
-            if begin == end {
-                continue;
-            }
-            if child & LEAF == 0 {
-                walk.stack.push(Frame { node: child, begin, end });
-            } else {
-                meet_leaf(simd, pair, walk, child & !LEAF, begin as usize, margins);
-                walk.candidates.truncate(begin as usize);
-            }
-        }
+    walk.store.serve(pair.body);
+    if !(pair.body.nodes.is_empty() || pair.obstacle.nodes.is_empty()) {
+        let touching = (ahead + pair.slack()) as f32;
+        let margins = Margins { near: (pair.tolerance + ahead + pair.slack()) as f32, touching };
+        descend(simd, pair, walk, margins);
     }
     let Walk { inversion, near, touching, .. } = walk;
-    inversion.invert(near, pair.obstacle.leaves.len());
+    near.body.finish();
+    touching.body.finish();
+    inversion.invert(simd, near, pair.obstacle.leaves.len());
     // Nobody asks what of the obstacle lies in a body that has no inside.
     touching.obstacle.of.clear();
     if pair.body.closed {
-        inversion.invert(touching, pair.obstacle.leaves.len());
+        inversion.invert(simd, touching, pair.obstacle.leaves.len());
     }
 }
 
-/// Appends to the candidates those of the frame that may be within the margin of `b`, opened down to about its size or, for a leaf, to leaves.
+#[inline(always)]
+fn descend<S: Simd>(simd: S, pair: Pair<'_>, walk: &mut Walk, margins: Margins) {
+    let columns = Columns::new(simd, pair.motion);
+    let root = &pair.body.nodes[0];
+    let bounds =
+        MovedChildren::new(simd, root, pair.motion).around(simd, children(root).0 | children(root).1);
+    let near = Boxes::of(&pair.obstacle.nodes[0]).near(simd, &bounds, margins.near);
+    walk.candidates.push(Candidate { node: 0, children: bits(near) });
+    walk.stack.push(Frame { node: 0, begin: 0, end: 1, bounds });
+    while let Some(frame) = walk.stack.pop() {
+        walk.candidates.truncate(frame.end as usize);
+        let node = &pair.body.nodes[frame.node as usize];
+        let moved = MovedChildren::new(simd, node, pair.motion);
+        let (mut leaves, mut nodes) = children(node);
+        if leaves != 0 {
+            // The box around the leaves after the motion is smaller than the one around all that was moved.
+            let around = moved.around(simd, leaves);
+            let bounds = Bounds { center: around.center, half: around.half, ..frame.bounds };
+            gather(simd, pair.obstacle, walk, &frame, &bounds, margins.near);
+            let most = walk.gathered.count() * leaves.count_ones() as usize;
+            leaves = if most == 0 { 0 } else { leaves };
+            walk.near.body.reserve(most);
+            walk.touching.body.reserve(most);
+            while leaves != 0 {
+                let lane = leaves.trailing_zeros() as usize % LANES;
+                leaves &= leaves - 1;
+                if !walk.gathered.far(simd, &moved.of(lane), margins.near) {
+                    meet_leaf(simd, pair, walk, node.child[lane] & !LEAF, &columns, margins);
+                }
+            }
+        }
+        let extents = moved.extents(simd, margins.near);
+        while nodes != 0 {
+            let lane = nodes.trailing_zeros() as usize % LANES;
+            nodes &= nodes - 1;
+            let begin = walk.candidates.len() as u32;
+            let bounds = moved.of(lane);
+            refine(simd, pair.obstacle, walk, &frame, &bounds, extents[lane], margins.near);
+            let end = walk.candidates.len() as u32;
+            if begin != end {
+                walk.stack.push(Frame { node: node.child[lane], begin, end, bounds });
+            }
+        }
+    }
+}
+
+/// Which of a node's children are leaves, and which nodes; one bit each.
+#[inline(always)]
+fn children(node: &Node) -> (u32, u32) {
+    let (mut leaves, mut nodes) = (0, 0);
+    for (lane, &child) in node.child.iter().enumerate() {
+        leaves |= u32::from(child & LEAF != 0 && child != EMPTY) << lane;
+        nodes |= u32::from(child & LEAF == 0) << lane;
+    }
+    (leaves, nodes)
+}
+
+/// Puts a node's children that the mask says onto the pile of those to be opened, of which there are `count`.
+#[inline(always)]
+fn open<S: Simd>(simd: S, pending: &mut Vec<u32>, count: &mut usize, node: &Node, mask: LaneMask<S>) {
+    if pending.len() < *count + LANES {
+        pending.resize(2 * (*count + LANES), 0);
+    }
+    let children = LaneNumbers::load_array_ref(simd, &node.child);
+    children.compress(mask).store_slice(&mut pending[*count..*count + LANES]);
+    *count += bits(mask).count_ones() as usize;
+}
+
+/// Appends to the candidates those children of the frame's that may be within the margin of `b`, opened until the squared diagonals of their
+/// boxes are not longer than `extent`.
 #[inline(always)]
 fn refine<S: Simd>(
     simd: S,
     obstacle: &Surface,
     walk: &mut Walk,
-    frame: Frame,
-    lane: usize,
+    frame: &Frame,
     b: &Bounds,
+    extent: f32,
     margin: f32,
-    to_leaves: bool,
 ) {
-    let extent = b.extent(margin);
-    for i in 0..(frame.end - frame.begin) as usize {
-        if walk.masks[i] >> lane & 1 == 0 {
-            continue;
+    let Walk { candidates, pending, .. } = walk;
+    let mut count = 0;
+    for i in frame.begin as usize..frame.end as usize {
+        let Candidate { node: index, children } = candidates[i];
+        let node = &obstacle.nodes[index as usize];
+        let near = Boxes::of(node).near(simd, b, margin) & LaneMask::from_bitmask(simd, u64::from(children));
+        let coarse = near & bounds::coarse_nodes(simd, node, extent);
+        open(simd, pending, &mut count, node, coarse);
+        let children = bits(near & !coarse);
+        if children != 0 {
+            candidates.push(Candidate { node: index, children });
         }
-        let candidate = walk.candidates[frame.begin as usize + i];
-        if candidate & LEAF != 0 {
-            walk.candidates.push(candidate);
-            continue;
-        }
-        // The node's own box was seen to be near the parent of `b`; look at its children.
-        walk.pending.push(candidate);
-        while let Some(open) = walk.pending.pop() {
-            let node = &obstacle.nodes[open as usize];
-            let mut mask = bounds::children_near(simd, node, b, margin);
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                let child = node.child[lane];
-                if child & LEAF == 0 && (to_leaves || child_extent(node, lane) > extent) {
-                    walk.pending.push(child);
-                } else {
-                    walk.candidates.push(child);
-                }
-            }
+    }
+    while count > 0 {
+        count -= 1;
+        let index = pending[count];
+        let node = &obstacle.nodes[index as usize];
+        let near = Boxes::of(node).near(simd, b, margin);
+        let coarse = near & bounds::coarse_nodes(simd, node, extent);
+        open(simd, pending, &mut count, node, coarse);
+        let children = bits(near & !coarse);
+        if children != 0 {
+            candidates.push(Candidate { node: index, children });
         }
     }
 }
 
+/// Gathers the leaves below the frame's candidates that may be within the margin of `b`.
 #[inline(always)]
-fn child_extent(node: &Node, lane: usize) -> f32 {
-    (0..3).map(|k| (node.max[k][lane] - node.min[k][lane]) * (node.max[k][lane] - node.min[k][lane])).sum()
+fn gather<S: Simd>(simd: S, obstacle: &Surface, walk: &mut Walk, frame: &Frame, b: &Bounds, margin: f32) {
+    let Walk { candidates, pending, gathered, .. } = walk;
+    gathered.clear();
+    let mut count = 0;
+    for &Candidate { node, children } in &candidates[frame.begin as usize..frame.end as usize] {
+        let node = &obstacle.nodes[node as usize];
+        let near = LaneMask::from_bitmask(simd, u64::from(children)) & Boxes::of(node).touch(simd, b, margin);
+        let nodes = bounds::nodes(simd, node);
+        open(simd, pending, &mut count, node, near & nodes);
+        gathered.append(simd, node, near & !nodes);
+    }
+    while count > 0 {
+        count -= 1;
+        let node = &obstacle.nodes[pending[count] as usize];
+        let near = Boxes::of(node).near(simd, b, margin);
+        let nodes = bounds::nodes(simd, node);
+        open(simd, pending, &mut count, node, near & nodes);
+        gathered.append(simd, node, near & !nodes);
+    }
+    gathered.finish(simd);
 }
 
-/// Keeps the candidates that may come within the margin of a leaf of the body.
+/// Lists the gathered leaves that may be within the margins of a leaf of the body.
 #[inline(always)]
-fn meet_leaf<S: Simd>(simd: S, pair: Pair<'_>, walk: &mut Walk, index: u32, begin: usize, margins: Margins) {
-    let leaf = &pair.body.leaves[index as usize];
-    let corners = Corners::moved(simd, &pair.body.blocks[index as usize], pair.motion);
-    let own = corners.bounds();
-    let (grown, touching) = (own.grown(margins.near), own.grown(margins.touching));
-    let slab = Slab::of(leaf, pair.motion);
-    let first = [walk.near.body.near.len(), walk.touching.body.near.len()];
-    for i in begin..walk.candidates.len() {
-        let candidate = walk.candidates[i] & !LEAF;
-        let other = &pair.obstacle.leaves[candidate as usize];
-        if !grown.overlaps(&other.min, &other.max) || slab.misses(&other.min, &other.max, margins.near) {
-            continue;
-        }
-        let apart = Slab::of_own(other).apart(corners.heights(other.normal));
-        if apart > margins.near {
-            continue;
-        }
-        walk.near.body.near.push(candidate);
-        if apart <= margins.touching
-            && touching.overlaps(&other.min, &other.max)
-            && !slab.misses(&other.min, &other.max, margins.touching)
-        {
-            walk.touching.body.near.push(candidate);
-        }
-    }
-    walk.near.end(index, first[0]);
-    walk.touching.end(index, first[1]);
-}
-
-/// Memory for listing pairs by leaf of the obstacle; all zero between two uses, so that only what is near costs time.
-#[derive(Clone, Debug, Default)]
-struct Inversion {
-    /// By leaf: how often it occurs, then where its next pair goes.
-    counts: Vec<u32>,
-    /// One bit a leaf: whether it occurs.
-    occurs: Vec<u64>,
-}
-
-impl Inversion {
-    /// The same pairs by leaf of the obstacle, in the order of its leaves.
-    #[inline(always)]
-    fn invert(&mut self, pairs: &mut Pairs, leaves: usize) {
-        let Pairs { body, obstacle } = pairs;
-        self.counts.resize(leaves, 0);
-        self.occurs.resize(leaves.div_ceil(64), 0);
-        for &other in &body.near {
-            self.counts[other as usize] += 1;
-            self.occurs[other as usize / 64] |= 1 << (other % 64);
-        }
-        obstacle.of.clear();
-        let mut begin = 0;
-        for (word, occurs) in self.occurs.iter_mut().enumerate() {
-            let mut bits = std::mem::take(occurs);
-            while bits != 0 {
-                let leaf = 64 * word as u32 + bits.trailing_zeros();
-                bits &= bits - 1;
-                let end = begin + std::mem::replace(&mut self.counts[leaf as usize], begin);
-                obstacle.of.push(Neighbourhood { leaf, begin, end });
-                begin = end;
-            }
-        }
-        obstacle.near.clear();
-        obstacle.near.resize(body.near.len(), 0);
-        for &Neighbourhood { leaf, begin, end } in &body.of {
-            for &other in &body.near[begin as usize..end as usize] {
-                let place = &mut self.counts[other as usize];
-                obstacle.near[*place as usize] = leaf;
-                *place += 1;
-            }
-        }
-        for of in &obstacle.of {
-            self.counts[of.leaf as usize] = 0;
-        }
-    }
+fn meet_leaf<S: Simd>(
+    simd: S,
+    pair: Pair<'_>,
+    walk: &mut Walk,
+    index: u32,
+    columns: &Columns<S>,
+    margins: Margins,
+) {
+    let Walk { gathered, close, corners, store, near, touching, .. } = walk;
+    corners.take(simd, pair.body, index, store, columns);
+    let slab = Slab::of(&pair.body.leaves[index as usize], pair.motion);
+    let mut lists = [near.body.list(), touching.body.list()];
+    gathered.meet(simd, corners, &slab, margins, close, &mut lists);
+    let [near_end, touching_end] = [lists[0].len, lists[1].len];
+    near.body.end(index, near_end);
+    touching.body.end(index, touching_end);
 }
 
 /// Greatest distance between the places of any point of a body under two motions; `root` is the first node of its tree.
@@ -322,7 +305,7 @@ mod tests {
     }
 
     /// Would catch a pair of close leaves that the walk passes over, one that is listed twice, and lists by leaf of the obstacle that are out of
-    /// order, or do not hold the pairs of this walk and no others.
+    /// order, or do not hold the pairs of this walk and no others; and a walk that lists much that is far.
     #[test]
     fn lists_hold_every_close_pair_from_both_sides() {
         let mut seed = 5u64;
@@ -331,16 +314,17 @@ mod tests {
             (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
         };
         let surfaces = [scattered(&mut number, 200, 1.0), scattered(&mut number, 300, 1.5)];
-        let [body, obstacle] = &surfaces;
         let mut memory = Walk::default();
-        let (mut found, mut all) = (0, 0);
+        let (mut found, mut kept, mut all) = (0, 0, 0);
         for round in 0..20 {
             let pose = Isometry3::new(
                 Vector3::from([0; 3].map(|_| 2.0 * number())),
                 Vector3::from([0; 3].map(|_| 3.0 * number())),
             );
             let [motion, inverse] = [pose, pose.inverse()].map(|pose| Rigid::from_isometry(&pose));
-            let (tolerance, ahead) = (0.05, 0.05 * f64::from(round % 3));
+            // One time everything is near, which is more than is held against a leaf in one piece; and the memory changes hands.
+            let (tolerance, ahead) = (if round == 7 { 9.0 } else { 0.05 }, 0.05 * f64::from(round % 3));
+            let [body, obstacle] = [&surfaces[round as usize % 2], &surfaces[1 - round as usize % 2]];
             let pair = Pair { body, obstacle, motion: &motion, inverse: &inverse, tolerance, travelled: 0.0 };
             dispatch!(Level::new(), simd => walk(simd, pair, ahead, &mut memory));
             for (pairs, within) in [(&memory.near, tolerance + ahead), (&memory.touching, ahead)] {
@@ -354,9 +338,10 @@ mod tests {
                 assert_eq!(by_obstacle.len(), by_body.len(), "{round}");
                 assert!(by_obstacle.iter().all(|&(other, own)| set.contains(&(own, other))), "{round}");
                 found += close.len();
+                kept += set.len();
             }
             all += body.leaves.len() * obstacle.leaves.len();
         }
-        assert!(found > 500 && found < all / 10, "{found} of {all}");
+        assert!(found > 500 && found < all / 10 && kept < 2 * found, "{found} and {kept} of {all}");
     }
 }
