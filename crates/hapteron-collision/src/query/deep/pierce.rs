@@ -1,0 +1,413 @@
+//! The inner loops that find which edges may run through which triangles, eight at a time and stage by stage over flat lists.
+//!
+//! In single precision throughout: what they refuse is certain, and so is what they say of a triangle that is surely pierced; all
+//! between is looked at again exactly.
+
+use super::edges::{EdgeBlock, Edges, edges_of, filled};
+use crate::query::kernel::{bits, lanes, lanes_of};
+use crate::query::walk::Neighbourhood;
+use crate::surface::{ERROR, LANES, Leaf, Surface, TriangleBlock};
+use crate::vector::{Rigid, Vec3};
+use fearless_simd::{Simd, f32x8, mask32x8, prelude::*, u32x8};
+
+/// Bound of the rounding of a segment's place, in units of the slack of single-precision coordinates.
+pub(super) const WIDE: f32 = 5.0;
+/// From how many blocks of edges on a batch is full. Its lists then still fit the nearest cache.
+const BATCH: usize = 24;
+/// Room for the edges of a leaf (three for each of its triangles), and for eight more that are written at once.
+const ROOM: usize = 4 * LANES;
+
+/// Up to eight edges in the other surface's frame, or what of them is farther from their ends than these are from the other surface.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(super) struct Segments {
+    /// Where they start.
+    start: [[f32; LANES]; 3],
+    /// Vectors to their ends.
+    along: [[f32; LANES]; 3],
+    /// Sums of the magnitudes of the coordinates of these.
+    size: [f32; LANES],
+    /// Negative when one end is known to be inside.
+    end: [f32; LANES],
+    pub edges: [u32; LANES],
+    /// The leaf that they are of.
+    pub leaf: u32,
+    /// One bit a lane: whether it runs through an odd number of triangles.
+    pub odd: u32,
+}
+
+impl Segments {
+    /// Lanes that are near nothing: so far away that they never are the closest, but not so far that a height is not a number.
+    const EMPTY: Self = Self {
+        start: [[1e30; LANES]; 3],
+        along: [[0.0; LANES]; 3],
+        size: [0.0; LANES],
+        end: [0.0; LANES],
+        edges: [0; LANES],
+        leaf: 0,
+        odd: 0,
+    };
+
+    /// True when one end of the edge in a lane is known to be inside.
+    #[inline(always)]
+    pub(super) fn begins_inside(&self, lane: usize) -> bool {
+        self.end[lane] < 0.0
+    }
+}
+
+/// A block of segments and a leaf whose bounds some of them meet.
+#[derive(Clone, Copy, Debug, Default)]
+struct Meeting {
+    leaf: u32,
+    block: u32,
+}
+
+/// A segment and the triangles of a leaf, one bit each, that it may run through, and those of them that it surely does.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Hit {
+    pub leaf: u32,
+    pub block: u16,
+    pub lane: u8,
+    pub maybe: u8,
+    pub surely: u8,
+}
+
+/// How the edges of one surface lie in the frame of the other.
+#[derive(Clone, Copy)]
+pub(super) struct Frame<'a, S> {
+    pub simd: S,
+    pub own: &'a Surface,
+    pub other: &'a Surface,
+    /// From the own frame to the other's.
+    pub motion: &'a Rigid,
+    pub rotation: [[f32; 3]; 3],
+    pub tolerance: f32,
+    /// Covers the rounding of single-precision coordinates, metres.
+    pub slack: f32,
+    /// The same where segments are held against leaves.
+    pub wide: f32,
+}
+
+/// Segments with the leaves that they meet, and what comes of it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Batch {
+    segments: Vec<Segments>,
+    filled: usize,
+    meetings: Vec<Meeting>,
+    /// By meeting: which lanes of the block meet the leaf's bounds.
+    meeting_lanes: Vec<u8>,
+    met: usize,
+    hits: Vec<Hit>,
+    pierced: usize,
+}
+
+/// The edges of a leaf that are kept, one behind the other.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(super) struct Rows {
+    start: [[f32; ROOM]; 3],
+    along: [[f32; ROOM]; 3],
+    size: [f32; ROOM],
+    end: [f32; ROOM],
+    edges: [u32; ROOM],
+}
+
+impl Rows {
+    pub(super) const EMPTY: Self = Self {
+        start: [[0.0; ROOM]; 3],
+        along: [[0.0; ROOM]; 3],
+        size: [0.0; ROOM],
+        end: [0.0; ROOM],
+        edges: [0; ROOM],
+    };
+}
+
+impl Batch {
+    pub(super) fn clear(&mut self) {
+        (self.filled, self.met, self.pierced) = (0, 0, 0);
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.filled >= BATCH
+    }
+
+    pub(super) fn segments(&mut self) -> &mut [Segments] {
+        &mut self.segments[..self.filled]
+    }
+
+    pub(super) fn hits(&mut self) -> (&[Hit], &mut [Segments]) {
+        (&self.hits[..self.pierced], &mut self.segments[..self.filled])
+    }
+
+    /// Takes the edges of a leaf that may run through a face: those with a far end that are longer than what their ends know to be
+    /// empty. Gives by how much less the ends of the others may know before one of them may, too.
+    #[inline(always)]
+    pub(super) fn take<S: Simd>(&mut self, frame: &Frame<'_, S>, edges: &mut Edges, leaf: u32, rows: &mut Rows) -> f32 {
+        let range = edges_of(frame.own, leaf);
+        let blocks = edges.of(frame.own, leaf);
+        let origin = frame.motion.point(frame.own.blocks[leaf as usize].origin.map(f64::from));
+        let origin = [origin[0] as f32, origin[1] as f32, origin[2] as f32];
+        let (mut count, mut known) = (0, 0);
+        let mut spare = f32x8::splat(frame.simd, f32::INFINITY);
+        for (index, block) in blocks.enumerate() {
+            let block = edges.block(block);
+            let first = range.start + (index * LANES) as u32;
+            let ends = block.vertices.each_ref().map(
+                #[inline(always)]
+                |vertices| distances(edges, vertices),
+            );
+            let part = Part::new(frame, block, ends);
+            spare = spare.min(part.spare);
+            known |= (bits(part.known) & filled(range.len(), index)) << (index * LANES);
+            let at = count.min(ROOM - LANES);
+            part.write(frame, block, origin, first, at, rows);
+            count += bits(part.long).count_ones() as usize;
+        }
+        edges.settle(range.start, known);
+        self.append(frame.simd, leaf, count.min(ROOM - LANES), rows);
+        spare.reduce_min()
+    }
+
+    /// Makes blocks of the rows.
+    #[inline(always)]
+    fn append<S: Simd>(&mut self, simd: S, leaf: u32, count: usize, rows: &mut Rows) {
+        let (far, zero) = (f32x8::splat(simd, 1e30), f32x8::splat(simd, 0.0));
+        for k in 0..3 {
+            far.store_slice(&mut rows.start[k][count..count + LANES]);
+            zero.store_slice(&mut rows.along[k][count..count + LANES]);
+        }
+        let blocks = count.div_ceil(LANES);
+        while self.segments.len() < self.filled + blocks {
+            self.segments.push(Segments::EMPTY);
+        }
+        for (index, block) in self.segments[self.filled..self.filled + blocks].iter_mut().enumerate() {
+            let at = (index * LANES).min(ROOM - LANES);
+            for k in 0..3 {
+                block.start[k].copy_from_slice(&rows.start[k][at..at + LANES]);
+                block.along[k].copy_from_slice(&rows.along[k][at..at + LANES]);
+            }
+            block.size.copy_from_slice(&rows.size[at..at + LANES]);
+            block.end.copy_from_slice(&rows.end[at..at + LANES]);
+            block.edges.copy_from_slice(&rows.edges[at..at + LANES]);
+            (block.leaf, block.odd) = (leaf, 0);
+        }
+        self.filled += blocks;
+    }
+
+    /// Lists which of the segments from number `first` on meet the bounds of which of the near leaves. Gives how far away at least any of them
+    /// is from any leaf; not positive when some meet.
+    #[inline(always)]
+    pub(super) fn meet<S: Simd>(&mut self, frame: &Frame<'_, S>, first: usize, near: &[u32]) -> f32 {
+        let most = self.met + (self.filled - first) * near.len() + LANES;
+        if self.meetings.len() < most {
+            self.meetings.resize(2 * most, Meeting::default());
+            self.meeting_lanes.resize(2 * most, 0);
+        }
+        let mut apart = f32x8::splat(frame.simd, f32::INFINITY);
+        let mut met = self.met;
+        for (index, block) in self.segments[..self.filled].iter().enumerate().skip(first) {
+            let segments = Moved::new(frame.simd, block);
+            for &leaf in near {
+                let own = segments.apart(frame.simd, &frame.other.leaves[leaf as usize], frame.wide);
+                apart = apart.min(own);
+                let lanes = bits(own.simd_le(0.0));
+                self.meetings[met] = Meeting { leaf, block: index as u32 };
+                self.meeting_lanes[met] = lanes as u8;
+                met += usize::from(lanes != 0);
+            }
+        }
+        self.met = met;
+        apart.reduce_min()
+    }
+
+    /// Lists which segments may run through which triangles.
+    #[inline(always)]
+    pub(super) fn pierce<S: Simd>(&mut self, frame: &Frame<'_, S>) {
+        self.meeting_lanes[self.met..].iter_mut().take(LANES).for_each(|lanes| *lanes = 0);
+        let (words, _) = self.meeting_lanes.as_chunks::<LANES>();
+        let (eights, _) = self.meetings.as_chunks::<LANES>();
+        let mut count = 0;
+        for (word, meetings) in words.iter().zip(eights).take(self.met.div_ceil(LANES)) {
+            let mut rest = u64::from_le_bytes(*word);
+            if self.hits.len() < count + 64 {
+                self.hits.resize(2 * count + 64, Hit::default());
+            }
+            while rest != 0 {
+                let bit = rest.trailing_zeros() as usize;
+                rest &= rest - 1;
+                let (meeting, lane) = (meetings[bit / LANES % LANES], bit % LANES);
+                let block = &frame.other.blocks[meeting.leaf as usize];
+                let filled = (1 << frame.other.leaves[meeting.leaf as usize].triangles) - 1;
+                let segments = &self.segments[meeting.block as usize];
+                let [maybe, surely] = pierced(frame.simd, segments, lane, block, frame.wide);
+                let maybe = maybe & filled;
+                self.hits[count] = Hit {
+                    leaf: meeting.leaf,
+                    block: meeting.block as u16,
+                    lane: lane as u8,
+                    maybe: maybe as u8,
+                    surely: (surely & filled) as u8,
+                };
+                count += usize::from(maybe != 0);
+            }
+        }
+        self.pierced = count;
+    }
+}
+
+#[inline(always)]
+fn distances(edges: &Edges, vertices: &[u32; LANES]) -> [f32; LANES] {
+    let mut result = [0.0; LANES];
+    for lane in 0..LANES {
+        result[lane] = edges.distance(vertices[lane]);
+    }
+    result
+}
+
+/// What is left of eight edges.
+struct Part<S: Simd> {
+    /// Which have two known ends.
+    known: mask32x8<S>,
+    /// Which may run through a face.
+    long: mask32x8<S>,
+    /// How much less the ends may know before the others may; infinite for these.
+    spare: f32x8<S>,
+    /// From which share of the edge to which.
+    shares: [f32x8<S>; 2],
+    /// Negative when one end is known to be inside.
+    end: f32x8<S>,
+}
+
+impl<S: Simd> Part<S> {
+    #[inline(always)]
+    fn new(frame: &Frame<'_, S>, block: &EdgeBlock, ends: [[f32; LANES]; 2]) -> Self {
+        let simd = frame.simd;
+        let zero = f32x8::splat(simd, 0.0);
+        let along = lanes_of(simd, &block.along);
+        let length = dot(along, along).sqrt();
+        let [a, b] = [lanes(simd, &ends[0]), lanes(simd, &ends[1])];
+        let [far_a, far_b] = [a.simd_eq(zero), b.simd_eq(zero)];
+        let tolerance = f32x8::splat(simd, frame.tolerance);
+        // Less by the rounding of all that is measured here.
+        let empty_a = (far_a.select(tolerance, a.abs()) - frame.slack).max(zero);
+        let empty_b = (far_b.select(tolerance, b.abs()) - frame.slack).max(zero);
+        let far = far_a | far_b;
+        let covered = length.simd_le(empty_a + empty_b);
+        // Both shrink as the body travels.
+        let of_covered = (empty_a + empty_b - length) * 0.5;
+        let of_known = tolerance - a.abs().max(b.abs()) * ROUNDED_UP - frame.slack;
+        let spare = far.select(of_covered, of_known);
+        let long = far & !covered;
+        let spare = long.select(f32x8::splat(simd, f32::INFINITY), spare);
+        let inverse = f32x8::splat(simd, 1.0) / length.max(f32::MIN_POSITIVE);
+        let shares = [empty_a * inverse, f32x8::splat(simd, 1.0) - empty_b * inverse];
+        Self { known: !far, long, spare, shares, end: a.min(b) }
+    }
+
+    /// Writes those that may run through a face into the rows, from place `at` on.
+    #[inline(always)]
+    fn write(&self, frame: &Frame<'_, S>, block: &EdgeBlock, origin: [f32; 3], first: u32, at: usize, rows: &mut Rows) {
+        let simd = frame.simd;
+        let (start, along) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
+        let rest = self.shares[1] - self.shares[0];
+        let mut size = f32x8::splat(simd, 0.0);
+        for k in 0..3 {
+            let turn = splat(simd, frame.rotation[k]);
+            let along = dot(turn, along);
+            let start = dot(turn, start) + origin[k] + along * self.shares[0];
+            let along = along * rest;
+            size += along.abs();
+            start.compress(self.long).store_slice(&mut rows.start[k][at..at + LANES]);
+            along.compress(self.long).store_slice(&mut rows.along[k][at..at + LANES]);
+        }
+        size.compress(self.long).store_slice(&mut rows.size[at..at + LANES]);
+        self.end.compress(self.long).store_slice(&mut rows.end[at..at + LANES]);
+        let edges = u32x8::from_fn(simd, |lane| lane as u32) + first;
+        edges.compress(self.long).store_slice(&mut rows.edges[at..at + LANES]);
+    }
+}
+
+/// Makes a positive number greater by more than it has been rounded down.
+const ROUNDED_UP: f32 = 1.0 + 3e-6;
+
+/// A block of segments that is held against one leaf after the other.
+struct Moved<S: Simd> {
+    start: [f32x8<S>; 3],
+    along: [f32x8<S>; 3],
+    low: [f32x8<S>; 3],
+    high: [f32x8<S>; 3],
+}
+
+impl<S: Simd> Moved<S> {
+    #[inline(always)]
+    fn new(simd: S, block: &Segments) -> Self {
+        let (start, along) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
+        let zero = f32x8::splat(simd, 0.0);
+        let low = [0, 1, 2].map(
+            #[inline(always)]
+            |k| start[k] + along[k].min(zero),
+        );
+        let high = [0, 1, 2].map(
+            #[inline(always)]
+            |k| start[k] + along[k].max(zero),
+        );
+        Self { start, along, low, high }
+    }
+
+    /// Lower bounds of the distances to a leaf; not positive where they may meet its bounds.
+    #[inline(always)]
+    fn apart(&self, simd: S, leaf: &Leaf, wide: f32) -> f32x8<S> {
+        let mut apart = f32x8::splat(simd, f32::NEG_INFINITY);
+        for k in 0..3 {
+            let (under, over) = (f32x8::splat(simd, leaf.min[k]) - self.high[k], self.low[k] - leaf.max[k]);
+            apart = apart.max(under.max(over));
+        }
+        let normal = splat(simd, leaf.normal);
+        let (height, rise) = (dot(normal, self.start), dot(normal, self.along));
+        let other = height + rise;
+        let under = f32x8::splat(simd, leaf.low) - height.max(other);
+        apart.max(under).max(height.min(other) - leaf.high) - wide
+    }
+}
+
+/// Bit `i` of the first number is set when a segment that meets the bounds of a leaf may run through triangle `i` of its block, and of the
+/// second when it surely does.
+#[inline(always)]
+fn pierced<S: Simd>(simd: S, segments: &Segments, lane: usize, b: &TriangleBlock, wide: f32) -> [u32; 2] {
+    let lane = lane % LANES;
+    let size = segments.size[lane];
+    let error = wide + 4.0 * b.error + 2.0 * ERROR * size;
+    let along = [segments.along[0][lane], segments.along[1][lane], segments.along[2][lane]];
+    let d = splat(simd, along);
+    let mut from = d;
+    for k in 0..3 {
+        from[k] = f32x8::splat(simd, segments.start[k][lane] - b.origin[k]) - lanes(simd, &b.corner[k]);
+    }
+    let normal = lanes_of(simd, &b.normal);
+    let (z, dz) = (dot(normal, from), dot(normal, d));
+    let to_z = z + dz;
+    let (low, high) = (z.min(to_z), z.max(to_z));
+    // Where the segment is almost in the plane the share of it is uncertain, and infinite or not a number in it.
+    let inverse = f32x8::splat(simd, 1.0) / dz;
+    let share = z * inverse;
+    let margin = inverse.abs() * (2.0 * error * size) + 2.0 * error;
+    let at = [from[0] - share * d[0], from[1] - share * d[1], from[2] - share * d[2]];
+    let (x, y) = (dot(lanes_of(simd, &b.along), at), dot(lanes_of(simd, &b.across), at));
+    let (u, v) = (lanes_of(simd, &b.second), lanes_of(simd, &b.third));
+    let across2 = u[1] * (x - lanes(simd, &b.length[0])) - u[0] * y;
+    let across3 = v[0] * y - v[1] * x;
+    let outside = across2.max(across3).max(-y);
+    let refused = low.simd_gt(error) | high.simd_lt(-error) | outside.simd_gt(margin);
+    let surely = low.simd_lt(-error) & high.simd_gt(error) & outside.simd_lt(-margin);
+    [bits(!refused), bits(surely)]
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, v: [f32; 3]) -> [f32x8<S>; 3] {
+    [f32x8::splat(simd, v[0]), f32x8::splat(simd, v[1]), f32x8::splat(simd, v[2])]
+}
+
+#[inline(always)]
+fn dot<S: Simd>(a: [f32x8<S>; 3], b: [f32x8<S>; 3]) -> f32x8<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
