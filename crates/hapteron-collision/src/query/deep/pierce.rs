@@ -5,8 +5,7 @@
 
 use super::edges::{EdgeBlock, Edges, edges_of, filled};
 use crate::query::kernel::{bits, lanes, lanes_of};
-use crate::query::walk::Neighbourhood;
-use crate::surface::{ERROR, LANES, Leaf, Surface, TriangleBlock};
+use crate::surface::{LANES, Leaf, Surface, TriangleBlock};
 use crate::vector::{Rigid, Vec3};
 use fearless_simd::{Simd, f32x8, mask32x8, prelude::*, u32x8};
 
@@ -21,7 +20,7 @@ const ROOM: usize = 4 * LANES;
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct Segments {
-    /// Where they start.
+    /// Where they start, about an origin.
     start: [[f32; LANES]; 3],
     /// Vectors to their ends.
     along: [[f32; LANES]; 3],
@@ -30,6 +29,8 @@ pub(super) struct Segments {
     /// Negative when one end is known to be inside.
     end: [f32; LANES],
     pub edges: [u32; LANES],
+    /// The origin, and what it lacks in single precision.
+    origin: [[f32; 3]; 2],
     /// The leaf that they are of.
     pub leaf: u32,
     /// One bit a lane: whether it runs through an odd number of triangles.
@@ -44,6 +45,7 @@ impl Segments {
         size: [0.0; LANES],
         end: [0.0; LANES],
         edges: [0; LANES],
+        origin: [[0.0; 3]; 2],
         leaf: 0,
         odd: 0,
     };
@@ -60,6 +62,10 @@ impl Segments {
 struct Meeting {
     leaf: u32,
     block: u32,
+    /// From the leaf's origin to that of the segments.
+    from: [f32; 3],
+    /// How far off the distance of a segment from a plane of the leaf may be, metres.
+    error: f32,
 }
 
 /// A segment and the triangles of a leaf, one bit each, that it may run through, and those of them that it surely does.
@@ -146,7 +152,6 @@ impl Batch {
         let range = edges_of(frame.own, leaf);
         let blocks = edges.of(frame.own, leaf);
         let origin = frame.motion.point(frame.own.blocks[leaf as usize].origin.map(f64::from));
-        let origin = [origin[0] as f32, origin[1] as f32, origin[2] as f32];
         let (mut count, mut known) = (0, 0);
         let mut spare = f32x8::splat(frame.simd, f32::INFINITY);
         for (index, block) in blocks.enumerate() {
@@ -160,21 +165,26 @@ impl Batch {
             spare = spare.min(part.spare);
             known |= (bits(part.known) & filled(range.len(), index)) << (index * LANES);
             let at = count.min(ROOM - LANES);
-            part.write(frame, block, origin, first, at, rows);
+            part.write(frame, block, first, at, rows);
             count += bits(part.long).count_ones() as usize;
         }
         edges.settle(range.start, known);
-        self.append(frame.simd, leaf, count.min(ROOM - LANES), rows);
+        self.append(frame.simd, leaf, origin, count.min(ROOM - LANES), rows);
         spare.reduce_min()
     }
 
     /// Makes blocks of the rows.
     #[inline(always)]
-    fn append<S: Simd>(&mut self, simd: S, leaf: u32, count: usize, rows: &mut Rows) {
+    fn append<S: Simd>(&mut self, simd: S, leaf: u32, origin: Vec3, count: usize, rows: &mut Rows) {
         let (far, zero) = (f32x8::splat(simd, 1e30), f32x8::splat(simd, 0.0));
         for k in 0..3 {
             far.store_slice(&mut rows.start[k][count..count + LANES]);
             zero.store_slice(&mut rows.along[k][count..count + LANES]);
+        }
+        let near = [origin[0] as f32, origin[1] as f32, origin[2] as f32];
+        let mut rest = near;
+        for k in 0..3 {
+            rest[k] = (origin[k] - f64::from(near[k])) as f32;
         }
         let blocks = count.div_ceil(LANES);
         while self.segments.len() < self.filled + blocks {
@@ -189,7 +199,7 @@ impl Batch {
             block.size.copy_from_slice(&rows.size[at..at + LANES]);
             block.end.copy_from_slice(&rows.end[at..at + LANES]);
             block.edges.copy_from_slice(&rows.edges[at..at + LANES]);
-            (block.leaf, block.odd) = (leaf, 0);
+            (block.origin, block.leaf, block.odd) = ([near, rest], leaf, 0);
         }
         self.filled += blocks;
     }
@@ -211,7 +221,7 @@ impl Batch {
                 let own = segments.apart(frame.simd, &frame.other.leaves[leaf as usize], frame.wide);
                 apart = apart.min(own);
                 let lanes = bits(own.simd_le(0.0));
-                self.meetings[met] = Meeting { leaf, block: index as u32 };
+                self.meetings[met] = Meeting { leaf, block: index as u32, ..Meeting::default() };
                 self.meeting_lanes[met] = lanes as u8;
                 met += usize::from(lanes != 0);
             }
@@ -220,9 +230,25 @@ impl Batch {
         apart.reduce_min()
     }
 
+    /// Makes the meetings ready for the triangles.
+    #[inline(always)]
+    fn refine<S: Simd>(&mut self, frame: &Frame<'_, S>) {
+        for meeting in &mut self.meetings[..self.met] {
+            let segments = &self.segments[meeting.block as usize];
+            let block = &frame.other.blocks[meeting.leaf as usize];
+            let [near, rest] = &segments.origin;
+            for k in 0..3 {
+                meeting.from[k] = near[k] - block.origin[k] + rest[k];
+            }
+            let own = &frame.own.blocks[segments.leaf as usize];
+            meeting.error = 6.0 * own.error + 4.0 * block.error + 1e-4 * frame.slack;
+        }
+    }
+
     /// Lists which segments may run through which triangles.
     #[inline(always)]
     pub(super) fn pierce<S: Simd>(&mut self, frame: &Frame<'_, S>) {
+        self.refine(frame);
         self.meeting_lanes[self.met..].iter_mut().take(LANES).for_each(|lanes| *lanes = 0);
         let (words, _) = self.meeting_lanes.as_chunks::<LANES>();
         let (eights, _) = self.meetings.as_chunks::<LANES>();
@@ -239,7 +265,7 @@ impl Batch {
                 let block = &frame.other.blocks[meeting.leaf as usize];
                 let filled = (1 << frame.other.leaves[meeting.leaf as usize].triangles) - 1;
                 let segments = &self.segments[meeting.block as usize];
-                let [maybe, surely] = pierced(frame.simd, segments, lane, block, frame.wide);
+                let [maybe, surely] = pierced(frame.simd, segments, lane, block, &meeting);
                 let maybe = maybe & filled;
                 self.hits[count] = Hit {
                     leaf: meeting.leaf,
@@ -306,7 +332,7 @@ impl<S: Simd> Part<S> {
 
     /// Writes those that may run through a face into the rows, from place `at` on.
     #[inline(always)]
-    fn write(&self, frame: &Frame<'_, S>, block: &EdgeBlock, origin: [f32; 3], first: u32, at: usize, rows: &mut Rows) {
+    fn write(&self, frame: &Frame<'_, S>, block: &EdgeBlock, first: u32, at: usize, rows: &mut Rows) {
         let simd = frame.simd;
         let (start, along) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
         let rest = self.shares[1] - self.shares[0];
@@ -314,7 +340,7 @@ impl<S: Simd> Part<S> {
         for k in 0..3 {
             let turn = splat(simd, frame.rotation[k]);
             let along = dot(turn, along);
-            let start = dot(turn, start) + origin[k] + along * self.shares[0];
+            let start = dot(turn, start) + along * self.shares[0];
             let along = along * rest;
             size += along.abs();
             start.compress(self.long).store_slice(&mut rows.start[k][at..at + LANES]);
@@ -342,6 +368,10 @@ impl<S: Simd> Moved<S> {
     #[inline(always)]
     fn new(simd: S, block: &Segments) -> Self {
         let (start, along) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
+        let start = [0, 1, 2].map(
+            #[inline(always)]
+            |k| start[k] + block.origin[0][k],
+        );
         let zero = f32x8::splat(simd, 0.0);
         let low = [0, 1, 2].map(
             #[inline(always)]
@@ -373,15 +403,15 @@ impl<S: Simd> Moved<S> {
 /// Bit `i` of the first number is set when a segment that meets the bounds of a leaf may run through triangle `i` of its block, and of the
 /// second when it surely does.
 #[inline(always)]
-fn pierced<S: Simd>(simd: S, segments: &Segments, lane: usize, b: &TriangleBlock, wide: f32) -> [u32; 2] {
+fn pierced<S: Simd>(simd: S, segments: &Segments, lane: usize, b: &TriangleBlock, meeting: &Meeting) -> [u32; 2] {
     let lane = lane % LANES;
     let size = segments.size[lane];
-    let error = wide + 4.0 * b.error + 2.0 * ERROR * size;
+    let error = meeting.error;
     let along = [segments.along[0][lane], segments.along[1][lane], segments.along[2][lane]];
     let d = splat(simd, along);
     let mut from = d;
     for k in 0..3 {
-        from[k] = f32x8::splat(simd, segments.start[k][lane] - b.origin[k]) - lanes(simd, &b.corner[k]);
+        from[k] = f32x8::splat(simd, segments.start[k][lane] + meeting.from[k]) - lanes(simd, &b.corner[k]);
     }
     let normal = lanes_of(simd, &b.normal);
     let (z, dz) = (dot(normal, from), dot(normal, d));
