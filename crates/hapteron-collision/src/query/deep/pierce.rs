@@ -157,10 +157,7 @@ impl Batch {
         for (index, block) in blocks.enumerate() {
             let block = edges.block(block);
             let first = range.start + (index * LANES) as u32;
-            let ends = block.vertices.each_ref().map(
-                #[inline(always)]
-                |vertices| distances(edges, vertices),
-            );
+            let ends = [distances(edges, &block.vertices[0]), distances(edges, &block.vertices[1])];
             let part = Part::new(frame, block, ends);
             spare = spare.min(part.spare);
             known |= (bits(part.known) & filled(range.len(), index)) << (index * LANES);
@@ -214,15 +211,17 @@ impl Batch {
             self.meeting_lanes.resize(2 * most, 0);
         }
         let mut apart = f32x8::splat(frame.simd, f32::INFINITY);
+        let leaves = frame.other.leaves.as_slice();
+        let (meetings, meeting_lanes) = (&mut self.meetings[..most], &mut self.meeting_lanes[..most]);
         let mut met = self.met;
         for (index, block) in self.segments[..self.filled].iter().enumerate().skip(first) {
             let segments = Moved::new(frame.simd, block);
             for &leaf in near {
-                let own = segments.apart(frame.simd, &frame.other.leaves[leaf as usize], frame.wide);
+                let own = segments.apart(frame.simd, &leaves[leaf as usize], frame.wide);
                 apart = apart.min(own);
                 let lanes = bits(own.simd_le(0.0));
-                self.meetings[met] = Meeting { leaf, block: index as u32, ..Meeting::default() };
-                self.meeting_lanes[met] = lanes as u8;
+                (meetings[met].leaf, meetings[met].block) = (leaf, index as u32);
+                meeting_lanes[met] = lanes as u8;
                 met += usize::from(lanes != 0);
             }
         }
@@ -367,31 +366,29 @@ struct Moved<S: Simd> {
 impl<S: Simd> Moved<S> {
     #[inline(always)]
     fn new(simd: S, block: &Segments) -> Self {
-        let (start, along) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
-        let start = [0, 1, 2].map(
-            #[inline(always)]
-            |k| start[k] + block.origin[0][k],
-        );
+        let (mut start, along) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
         let zero = f32x8::splat(simd, 0.0);
-        let low = [0, 1, 2].map(
-            #[inline(always)]
-            |k| start[k] + along[k].min(zero),
-        );
-        let high = [0, 1, 2].map(
-            #[inline(always)]
-            |k| start[k] + along[k].max(zero),
-        );
+        let (mut low, mut high) = (start, start);
+        for k in 0..3 {
+            start[k] = start[k] + block.origin[0][k];
+            low[k] = start[k] + along[k].min(zero);
+            high[k] = start[k] + along[k].max(zero);
+        }
         Self { start, along, low, high }
+    }
+
+    /// How far beside a leaf's box, along an axis.
+    #[inline(always)]
+    fn beside(&self, simd: S, leaf: &Leaf, axis: usize) -> f32x8<S> {
+        let under = f32x8::splat(simd, leaf.min[axis]) - self.high[axis];
+        under.max(self.low[axis] - leaf.max[axis])
     }
 
     /// Lower bounds of the distances to a leaf; not positive where they may meet its bounds.
     #[inline(always)]
     fn apart(&self, simd: S, leaf: &Leaf, wide: f32) -> f32x8<S> {
-        let mut apart = f32x8::splat(simd, f32::NEG_INFINITY);
-        for k in 0..3 {
-            let (under, over) = (f32x8::splat(simd, leaf.min[k]) - self.high[k], self.low[k] - leaf.max[k]);
-            apart = apart.max(under.max(over));
-        }
+        let mut apart = self.beside(simd, leaf, 0);
+        apart = apart.max(self.beside(simd, leaf, 1)).max(self.beside(simd, leaf, 2));
         let normal = splat(simd, leaf.normal);
         let (height, rise) = (dot(normal, self.start), dot(normal, self.along));
         let other = height + rise;
