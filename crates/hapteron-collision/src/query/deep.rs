@@ -220,29 +220,27 @@ fn settle<S: Simd>(
     push: &mut impl FnMut(Inside, &Foot),
 ) {
     search.crossings.clear();
-    let (hits, segments) = batch.hits();
-    for hit in hits {
-        let segments = &mut segments[usize::from(hit.block)];
-        let lane = usize::from(hit.lane) % LANES;
-        let sure = u32::from(hit.surely);
-        if segments.begins_inside(lane) {
+    for index in 0..batch.hits() {
+        let hit = batch.hit(index);
+        let segments = &batch.segments()[hit.block];
+        let (leaf, edge) = (segments.leaf, segments.edges[hit.lane]);
+        if segments.begins_inside(hit.lane) {
             // It matters no more than whether the other end is outside.
-            segments.odd ^= (sure.count_ones() & 1) << lane;
+            let mut odd = hit.surely.count_ones() & 1;
             if hit.maybe != hit.surely {
-                let unsure = u32::from(hit.maybe & !hit.surely);
-                exactly(dive, segments.edges[lane], hit.leaf, unsure, |_| segments.odd ^= 1 << lane);
+                exactly(dive, edge, hit.leaf, hit.maybe & !hit.surely, |_| odd ^= 1);
             }
+            batch.count(&hit, odd);
         } else {
-            let (leaf, edge) = (segments.leaf, segments.edges[lane]);
-            exactly(dive, edge, hit.leaf, u32::from(hit.maybe), |share| {
+            exactly(dive, edge, hit.leaf, hit.maybe, |share| {
                 search.crossings.push(Crossing { leaf, edge, share, known: false });
             });
         }
     }
-    for hit in hits {
-        let segments = &segments[usize::from(hit.block)];
-        let lane = usize::from(hit.lane) % LANES;
-        edges.settle(segments.edges[lane], segments.odd >> lane & 1);
+    for index in 0..batch.hits() {
+        let hit = batch.hit(index);
+        let segments = &batch.segments()[hit.block];
+        edges.settle(segments.edges[hit.lane], segments.odd >> hit.lane & 1);
     }
     if !search.crossings.is_empty() {
         follow_all(dive, side, edges, search, push);

@@ -13,6 +13,8 @@ use fearless_simd::{Simd, f32x8, mask32x8, prelude::*, u32x8};
 pub(super) const WIDE: f32 = 5.0;
 /// From how many blocks of edges on a batch is full. Its lists then still fit the nearest cache.
 const BATCH: usize = 24;
+/// Bits of eight meetings.
+const WORD: usize = LANES * LANES;
 /// Room for the edges of a leaf (three for each of its triangles), and for eight more that are written at once.
 const ROOM: usize = 4 * LANES;
 
@@ -31,6 +33,8 @@ pub(super) struct Segments {
     pub edges: [u32; LANES],
     /// The origin, and what it lacks in single precision.
     origin: [[f32; 3]; 2],
+    /// How far off a distance from them may be as they are turned, metres.
+    error: f32,
     /// The leaf that they are of.
     pub leaf: u32,
     /// One bit a lane: whether it runs through an odd number of triangles.
@@ -46,9 +50,35 @@ impl Segments {
         end: [0.0; LANES],
         edges: [0; LANES],
         origin: [[0.0; 3]; 2],
+        error: 0.0,
         leaf: 0,
         odd: 0,
     };
+
+    /// Takes eight edges from place `at` of the rows on, of which so many are left, and turns them into the other frame.
+    #[inline(always)]
+    fn turn<S: Simd>(&mut self, frame: &Frame<'_, S>, rows: &Rows, at: usize, left: usize) {
+        let simd = frame.simd;
+        let end = at + LANES;
+        let start = eight_of(simd, &rows.start, at);
+        let along = eight_of(simd, &rows.along, at);
+        let [from, part] = eight_of(simd, &rows.part, at);
+        let filled = f32x8::load_array(simd, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]).simd_lt(left as f32);
+        let (far, zero) = (f32x8::splat(simd, 1e30), f32x8::splat(simd, 0.0));
+        let mut size = zero;
+        for k in 0..3 {
+            let turn = splat(simd, frame.rotation[k]);
+            let whole = dot(turn, along);
+            let start = dot(turn, start) + whole * from;
+            let along = whole * part;
+            size += along.abs();
+            filled.select(start, far).store_array(&mut self.start[k]);
+            filled.select(along, zero).store_array(&mut self.along[k]);
+        }
+        size.store_array(&mut self.size);
+        self.end.copy_from_slice(&rows.end[at..end]);
+        self.edges.copy_from_slice(&rows.edges[at..end]);
+    }
 
     /// True when one end of the edge in a lane is known to be inside.
     #[inline(always)]
@@ -61,7 +91,9 @@ impl Segments {
 #[derive(Clone, Copy, Debug, Default)]
 struct Meeting {
     leaf: u32,
-    block: u32,
+    block: u16,
+    /// One bit for each triangle of the leaf.
+    triangles: u16,
     /// From the leaf's origin to that of the segments.
     from: [f32; 3],
     /// How far off the distance of a segment from a plane of the leaf may be, metres.
@@ -69,13 +101,13 @@ struct Meeting {
 }
 
 /// A segment and the triangles of a leaf, one bit each, that it may run through, and those of them that it surely does.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Hit {
     pub leaf: u32,
-    pub block: u16,
-    pub lane: u8,
-    pub maybe: u8,
-    pub surely: u8,
+    pub block: usize,
+    pub lane: usize,
+    pub maybe: u32,
+    pub surely: u32,
 }
 
 /// How the edges of one surface lie in the frame of the other.
@@ -103,17 +135,19 @@ pub(super) struct Batch {
     /// By meeting: which lanes of the block meet the leaf's bounds.
     meeting_lanes: Vec<u8>,
     met: usize,
-    hits: Vec<Hit>,
+    /// Where a segment may run through triangles of a leaf: which those are and which surely, by eight bits, and the meeting and the lane.
+    hits: Vec<u64>,
     pierced: usize,
 }
 
-/// The edges of a leaf that are kept, one behind the other.
+/// The edges of a leaf that are kept, one behind the other, as they are in the leaf.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct Rows {
     start: [[f32; ROOM]; 3],
     along: [[f32; ROOM]; 3],
-    size: [f32; ROOM],
+    /// Which part of them is kept: from where, as a share, and how much.
+    part: [[f32; ROOM]; 2],
     end: [f32; ROOM],
     edges: [u32; ROOM],
 }
@@ -122,7 +156,7 @@ impl Rows {
     pub(super) const EMPTY: Self = Self {
         start: [[0.0; ROOM]; 3],
         along: [[0.0; ROOM]; 3],
-        size: [0.0; ROOM],
+        part: [[0.0; ROOM]; 2],
         end: [0.0; ROOM],
         edges: [0; ROOM],
     };
@@ -137,12 +171,27 @@ impl Batch {
         self.filled >= BATCH
     }
 
-    pub(super) fn segments(&mut self) -> &mut [Segments] {
-        &mut self.segments[..self.filled]
+    pub(super) fn segments(&self) -> &[Segments] {
+        &self.segments[..self.filled]
     }
 
-    pub(super) fn hits(&mut self) -> (&[Hit], &mut [Segments]) {
-        (&self.hits[..self.pierced], &mut self.segments[..self.filled])
+    pub(super) fn hits(&self) -> usize {
+        self.pierced
+    }
+
+    #[inline(always)]
+    pub(super) fn hit(&self, index: usize) -> Hit {
+        let hit = self.hits[index];
+        let meeting = &self.meetings[(hit >> 19) as usize];
+        let (maybe, surely) = (hit as u32 & 0xff, hit as u32 >> 8 & 0xff);
+        let (block, lane) = (usize::from(meeting.block), (hit >> 16) as usize % LANES);
+        Hit { leaf: meeting.leaf, block, lane, maybe, surely }
+    }
+
+    /// Notes that a segment runs through more triangles, by one bit whether their number is odd.
+    #[inline(always)]
+    pub(super) fn count(&mut self, hit: &Hit, odd: u32) {
+        self.segments[hit.block].odd ^= odd << hit.lane;
     }
 
     /// Takes the edges of a leaf that may run through a face: those with a far end that are longer than what their ends know to be
@@ -151,52 +200,42 @@ impl Batch {
     pub(super) fn take<S: Simd>(&mut self, frame: &Frame<'_, S>, edges: &mut Edges, leaf: u32, rows: &mut Rows) -> f32 {
         let range = edges_of(frame.own, leaf);
         let blocks = edges.of(frame.own, leaf);
-        let origin = frame.motion.point(frame.own.blocks[leaf as usize].origin.map(f64::from));
         let (mut count, mut known) = (0, 0);
         let mut spare = f32x8::splat(frame.simd, f32::INFINITY);
         for (index, block) in blocks.enumerate() {
             let block = edges.block(block);
-            let first = range.start + (index * LANES) as u32;
             let ends = [distances(edges, &block.vertices[0]), distances(edges, &block.vertices[1])];
             let part = Part::new(frame, block, ends);
             spare = spare.min(part.spare);
             known |= (bits(part.known) & filled(range.len(), index)) << (index * LANES);
-            let at = count.min(ROOM - LANES);
-            part.write(frame, block, first, at, rows);
+            let first = range.start + (index * LANES) as u32;
+            part.write(frame.simd, block, first, count.min(ROOM - LANES), rows);
             count += bits(part.long).count_ones() as usize;
         }
         edges.settle(range.start, known);
-        self.append(frame.simd, leaf, origin, count.min(ROOM - LANES), rows);
+        self.append(frame, leaf, count.min(ROOM - LANES), rows);
         spare.reduce_min()
     }
 
-    /// Makes blocks of the rows.
+    /// Turns the rows into the other surface's frame.
     #[inline(always)]
-    fn append<S: Simd>(&mut self, simd: S, leaf: u32, origin: Vec3, count: usize, rows: &mut Rows) {
-        let (far, zero) = (f32x8::splat(simd, 1e30), f32x8::splat(simd, 0.0));
+    fn append<S: Simd>(&mut self, frame: &Frame<'_, S>, leaf: u32, count: usize, rows: &Rows) {
+        let own = &frame.own.blocks[leaf as usize];
+        let origin = frame.motion.point(own.origin.map(f64::from));
+        let (mut near, mut rest) = ([0.0; 3], [0.0; 3]);
         for k in 0..3 {
-            far.store_slice(&mut rows.start[k][count..count + LANES]);
-            zero.store_slice(&mut rows.along[k][count..count + LANES]);
-        }
-        let near = [origin[0] as f32, origin[1] as f32, origin[2] as f32];
-        let mut rest = near;
-        for k in 0..3 {
+            near[k] = origin[k] as f32;
             rest[k] = (origin[k] - f64::from(near[k])) as f32;
         }
+        let error = 6.0 * own.error + 1e-4 * frame.slack;
         let blocks = count.div_ceil(LANES);
         while self.segments.len() < self.filled + blocks {
             self.segments.push(Segments::EMPTY);
         }
         for (index, block) in self.segments[self.filled..self.filled + blocks].iter_mut().enumerate() {
             let at = (index * LANES).min(ROOM - LANES);
-            for k in 0..3 {
-                block.start[k].copy_from_slice(&rows.start[k][at..at + LANES]);
-                block.along[k].copy_from_slice(&rows.along[k][at..at + LANES]);
-            }
-            block.size.copy_from_slice(&rows.size[at..at + LANES]);
-            block.end.copy_from_slice(&rows.end[at..at + LANES]);
-            block.edges.copy_from_slice(&rows.edges[at..at + LANES]);
-            (block.origin, block.leaf, block.odd) = ([near, rest], leaf, 0);
+            block.turn(frame, rows, at, count - at);
+            (block.origin, block.error, block.leaf, block.odd) = ([near, rest], error, leaf, 0);
         }
         self.filled += blocks;
     }
@@ -220,7 +259,7 @@ impl Batch {
                 let own = segments.apart(frame.simd, &leaves[leaf as usize], frame.wide);
                 apart = apart.min(own);
                 let lanes = bits(own.simd_le(0.0));
-                (meetings[met].leaf, meetings[met].block) = (leaf, index as u32);
+                (meetings[met].leaf, meetings[met].block) = (leaf, index as u16);
                 meeting_lanes[met] = lanes as u8;
                 met += usize::from(lanes != 0);
             }
@@ -232,15 +271,17 @@ impl Batch {
     /// Makes the meetings ready for the triangles.
     #[inline(always)]
     fn refine<S: Simd>(&mut self, frame: &Frame<'_, S>) {
+        let (leaves, blocks) = (frame.other.leaves.as_slice(), frame.other.blocks.as_slice());
+        let segments = self.segments.as_slice();
         for meeting in &mut self.meetings[..self.met] {
-            let segments = &self.segments[meeting.block as usize];
-            let block = &frame.other.blocks[meeting.leaf as usize];
+            let block = &blocks[meeting.leaf as usize];
+            let segments = &segments[usize::from(meeting.block)];
             let [near, rest] = &segments.origin;
             for k in 0..3 {
                 meeting.from[k] = near[k] - block.origin[k] + rest[k];
             }
-            let own = &frame.own.blocks[segments.leaf as usize];
-            meeting.error = 6.0 * own.error + 4.0 * block.error + 1e-4 * frame.slack;
+            meeting.error = segments.error + 4.0 * block.error;
+            meeting.triangles = (1 << leaves[meeting.leaf as usize].triangles) - 1;
         }
     }
 
@@ -251,33 +292,42 @@ impl Batch {
         self.meeting_lanes[self.met..].iter_mut().take(LANES).for_each(|lanes| *lanes = 0);
         let (words, _) = self.meeting_lanes.as_chunks::<LANES>();
         let (eights, _) = self.meetings.as_chunks::<LANES>();
+        let (segments, blocks) = (self.segments.as_slice(), frame.other.blocks.as_slice());
         let mut count = 0;
-        for (word, meetings) in words.iter().zip(eights).take(self.met.div_ceil(LANES)) {
-            let mut rest = u64::from_le_bytes(*word);
-            if self.hits.len() < count + 64 {
-                self.hits.resize(2 * count + 64, Hit::default());
+        let words = words.iter().zip(eights).take(self.met.div_ceil(LANES));
+        for (number, (word, meetings)) in words.enumerate() {
+            if self.hits.len() < count + WORD {
+                self.hits.resize(2 * count + WORD, 0);
             }
+            let Some(hits) = self.hits[count..].first_chunk_mut::<WORD>() else { continue };
+            let mut rest = u64::from_le_bytes(*word);
+            let mut own = 0;
             while rest != 0 {
                 let bit = rest.trailing_zeros() as usize;
                 rest &= rest - 1;
-                let (meeting, lane) = (meetings[bit / LANES % LANES], bit % LANES);
-                let block = &frame.other.blocks[meeting.leaf as usize];
-                let filled = (1 << frame.other.leaves[meeting.leaf as usize].triangles) - 1;
-                let segments = &self.segments[meeting.block as usize];
-                let [maybe, surely] = pierced(frame.simd, segments, lane, block, &meeting);
-                let maybe = maybe & filled;
-                self.hits[count] = Hit {
-                    leaf: meeting.leaf,
-                    block: meeting.block as u16,
-                    lane: lane as u8,
-                    maybe: maybe as u8,
-                    surely: (surely & filled) as u8,
-                };
-                count += usize::from(maybe != 0);
+                let (meeting, lane) = (&meetings[bit / LANES % LANES], bit % LANES);
+                let segments = &segments[usize::from(meeting.block)];
+                let block = &blocks[meeting.leaf as usize];
+                let [maybe, surely] = pierced(frame.simd, segments, lane, block, meeting);
+                let triangles = u32::from(meeting.triangles);
+                let (maybe, surely) = (maybe & triangles, surely & triangles);
+                hits[own % WORD] = u64::from(surely << 8 | maybe) | ((number * WORD + bit) as u64) << 16;
+                own += usize::from(maybe != 0);
             }
+            count += own;
         }
         self.pierced = count;
     }
+}
+
+/// Eight numbers of each row, from place `at` on.
+#[inline(always)]
+fn eight_of<S: Simd, const N: usize>(simd: S, rows: &[[f32; ROOM]; N], at: usize) -> [f32x8<S>; N] {
+    let mut result = [f32x8::splat(simd, 0.0); N];
+    for (eight, row) in result.iter_mut().zip(rows) {
+        *eight = f32x8::from_slice(simd, &row[at..at + LANES]);
+    }
+    result
 }
 
 #[inline(always)]
@@ -297,8 +347,8 @@ struct Part<S: Simd> {
     long: mask32x8<S>,
     /// How much less the ends may know before the others may; infinite for these.
     spare: f32x8<S>,
-    /// From which share of the edge to which.
-    shares: [f32x8<S>; 2],
+    /// What is kept: from which share of the edge, and how much.
+    part: [f32x8<S>; 2],
     /// Negative when one end is known to be inside.
     end: f32x8<S>,
 }
@@ -325,30 +375,25 @@ impl<S: Simd> Part<S> {
         let long = far & !covered;
         let spare = long.select(f32x8::splat(simd, f32::INFINITY), spare);
         let inverse = f32x8::splat(simd, 1.0) / length.max(f32::MIN_POSITIVE);
-        let shares = [empty_a * inverse, f32x8::splat(simd, 1.0) - empty_b * inverse];
-        Self { known: !far, long, spare, shares, end: a.min(b) }
+        let from = empty_a * inverse;
+        let part = [from, f32x8::splat(simd, 1.0) - empty_b * inverse - from];
+        Self { known: !far, long, spare, part, end: a.min(b) }
     }
 
     /// Writes those that may run through a face into the rows, from place `at` on.
     #[inline(always)]
-    fn write(&self, frame: &Frame<'_, S>, block: &EdgeBlock, first: u32, at: usize, rows: &mut Rows) {
-        let simd = frame.simd;
-        let (start, along) = (lanes_of(simd, &block.start), lanes_of(simd, &block.along));
-        let rest = self.shares[1] - self.shares[0];
-        let mut size = f32x8::splat(simd, 0.0);
+    fn write(&self, simd: S, block: &EdgeBlock, first: u32, at: usize, rows: &mut Rows) {
+        let end = at + LANES;
         for k in 0..3 {
-            let turn = splat(simd, frame.rotation[k]);
-            let along = dot(turn, along);
-            let start = dot(turn, start) + along * self.shares[0];
-            let along = along * rest;
-            size += along.abs();
-            start.compress(self.long).store_slice(&mut rows.start[k][at..at + LANES]);
-            along.compress(self.long).store_slice(&mut rows.along[k][at..at + LANES]);
+            lanes(simd, &block.start[k]).compress(self.long).store_slice(&mut rows.start[k][at..end]);
+            lanes(simd, &block.along[k]).compress(self.long).store_slice(&mut rows.along[k][at..end]);
         }
-        size.compress(self.long).store_slice(&mut rows.size[at..at + LANES]);
-        self.end.compress(self.long).store_slice(&mut rows.end[at..at + LANES]);
-        let edges = u32x8::from_fn(simd, |lane| lane as u32) + first;
-        edges.compress(self.long).store_slice(&mut rows.edges[at..at + LANES]);
+        for k in 0..2 {
+            self.part[k].compress(self.long).store_slice(&mut rows.part[k][at..end]);
+        }
+        self.end.compress(self.long).store_slice(&mut rows.end[at..end]);
+        let edges = u32x8::load_array(simd, [0, 1, 2, 3, 4, 5, 6, 7]) + first;
+        edges.compress(self.long).store_slice(&mut rows.edges[at..end]);
     }
 }
 
