@@ -230,17 +230,12 @@ fn settle<S: Simd>(
             if hit.maybe != hit.surely {
                 exactly(dive, edge, hit.leaf, hit.maybe & !hit.surely, |_| odd ^= 1);
             }
-            batch.count(&hit, odd);
+            edges.toggle(edge, odd);
         } else {
             exactly(dive, edge, hit.leaf, hit.maybe, |share| {
                 search.crossings.push(Crossing { leaf, edge, share, known: false });
             });
         }
-    }
-    for index in 0..batch.hits() {
-        let hit = batch.hit(index);
-        let segments = &batch.segments()[hit.block];
-        edges.settle(segments.edges[hit.lane], segments.odd >> hit.lane & 1);
     }
     if !search.crossings.is_empty() {
         follow_all(dive, side, edges, search, push);

@@ -93,6 +93,12 @@ impl Edges {
         self.settled[word + 1] |= (bits >> 64) as u64;
     }
 
+    /// Marks an edge that was not, or the other way round, when the last bit is set.
+    #[inline(always)]
+    pub(super) fn toggle(&mut self, edge: u32, odd: u32) {
+        self.settled[edge as usize / 64] ^= u64::from(odd) << (edge % 64);
+    }
+
     #[inline(always)]
     pub(super) fn is_settled(&self, edge: u32) -> bool {
         self.settled[edge as usize / 64] >> (edge % 64) & 1 == 1

@@ -37,8 +37,6 @@ pub(super) struct Segments {
     error: f32,
     /// The leaf that they are of.
     pub leaf: u32,
-    /// One bit a lane: whether it runs through an odd number of triangles.
-    pub odd: u32,
 }
 
 impl Segments {
@@ -52,7 +50,6 @@ impl Segments {
         origin: [[0.0; 3]; 2],
         error: 0.0,
         leaf: 0,
-        odd: 0,
     };
 
     /// Takes eight edges from place `at` of the rows on, of which so many are left, and turns them into the other frame.
@@ -188,12 +185,6 @@ impl Batch {
         Hit { leaf: meeting.leaf, block, lane, maybe, surely }
     }
 
-    /// Notes that a segment runs through more triangles, by one bit whether their number is odd.
-    #[inline(always)]
-    pub(super) fn count(&mut self, hit: &Hit, odd: u32) {
-        self.segments[hit.block].odd ^= odd << hit.lane;
-    }
-
     /// Takes the edges of a leaf that may run through a face: those with a far end that are longer than what their ends know to be
     /// empty. Gives by how much less the ends of the others may know before one of them may, too.
     #[inline(always)]
@@ -235,7 +226,7 @@ impl Batch {
         for (index, block) in self.segments[self.filled..self.filled + blocks].iter_mut().enumerate() {
             let at = (index * LANES).min(ROOM - LANES);
             block.turn(frame, rows, at, count - at);
-            (block.origin, block.error, block.leaf, block.odd) = ([near, rest], error, leaf, 0);
+            (block.origin, block.error, block.leaf) = ([near, rest], error, leaf);
         }
         self.filled += blocks;
     }
