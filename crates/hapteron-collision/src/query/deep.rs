@@ -86,6 +86,7 @@ impl<S> Dive<'_, S> {
             other: self.other,
             motion: self.motion,
             rotation: self.motion.rotation.map(|row| row.map(|c| c as f32)),
+            exact_tolerance: self.tolerance,
             tolerance: (self.tolerance * edges::ROUNDED_DOWN) as f32,
             slack: self.slack,
             wide: pierce::WIDE * self.slack,
@@ -180,7 +181,7 @@ fn run<S: Simd>(
             continue;
         }
         let first = batch.segments().len();
-        let spare = batch.take(&frame, edges, of.leaf, &mut rows);
+        let spare = batch.take(&frame, edges, side, of.leaf, &mut rows);
         let near = &neighbours.near[of.begin as usize..of.end as usize];
         let clear = spare.min(0.5 * batch.meet(&frame, first, near));
         // As the body travels, what is known of an edge's ends shrinks as well.
@@ -200,7 +201,7 @@ fn run<S: Simd>(
             }
             let [a, b] = dive.own.edges[edge as usize].vertices;
             let other = if a == vertex { b } else { a };
-            if edges.distance(other) == 0.0 {
+            if side.signed_distance(other).is_infinite() {
                 let within = side.signed_distance(vertex).abs() + length(dive.own, edge);
                 look(dive, other, within, side, edges, search, &mut push);
             }

@@ -4,14 +4,49 @@ use crate::query::side::Side;
 use crate::surface::{LANES, Surface};
 use std::ops::Range;
 
-/// Up to eight edges of a leaf about its origin, as a start and a vector to the end, by axis and lane, with their vertices. Lanes without an
-/// edge have one without length at the first vertex of the leaf's first edge.
+/// Numbers by index, zero where none has been set; near ones are often set together, and most never.
+#[derive(Clone, Debug, Default)]
+struct Sparse {
+    /// By page of indices: where its numbers are, plus one; zero when none has been set.
+    pages: Vec<u32>,
+    numbers: Vec<[u32; PAGE]>,
+}
+
+const PAGE: usize = 64;
+
+impl Sparse {
+    fn reset(&mut self, indices: usize) {
+        self.numbers.clear();
+        self.pages.clear();
+        self.pages.resize(indices.div_ceil(PAGE), 0);
+    }
+
+    #[inline(always)]
+    fn get(&self, index: u32) -> u32 {
+        match self.pages[index as usize / PAGE] {
+            0 => 0,
+            page => self.numbers[page as usize - 1][index as usize % PAGE],
+        }
+    }
+
+    fn set(&mut self, index: u32, number: u32) {
+        let page = &mut self.pages[index as usize / PAGE];
+        if *page == 0 {
+            self.numbers.push([0; PAGE]);
+            *page = self.numbers.len() as u32;
+        }
+        self.numbers[*page as usize - 1][index as usize % PAGE] = number;
+    }
+}
+
+/// Up to eight edges of a leaf about its origin, as a start and a vector to the end, by axis and lane, with the places of their vertices.
+/// Lanes without an edge have the vertices of the block's first edge and no length.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(super) struct EdgeBlock {
     pub start: [[f32; LANES]; 3],
     pub along: [[f32; LANES]; 3],
-    pub vertices: [[u32; LANES]; 2],
+    pub places: [[u32; LANES]; 2],
 }
 
 /// The edges of a leaf.
@@ -29,8 +64,10 @@ pub(super) struct Edges {
     identity: Option<u64>,
     blocks: Vec<EdgeBlock>,
     /// By leaf: where its blocks begin, plus one; zero when nobody has asked for them.
-    begin: Vec<u32>,
-    /// By vertex: a lower bound of its distance to the other surface, negative inside; zero when it is not known.
+    begin: Sparse,
+    /// By vertex: its place in the next list, plus one; zero when it is at no edge of those leaves.
+    places: Sparse,
+    /// A lower bound of the distance to the other surface, negative inside; zero when it is not known.
     known: Vec<f32>,
     /// One bit an edge: its far end is known, or known to lie on the other side.
     settled: Vec<u64>,
@@ -45,10 +82,11 @@ impl Edges {
         self.identity = Some(surface.identity);
         self.blocks.clear();
         self.blocks.reserve(2 * leaves + leaves / 4);
-        // Zeros that nobody touches cost nothing this way.
-        self.begin = vec![0; surface.leaves.len()];
-        self.known = vec![0.0; surface.vertices.len()];
-        self.settled = vec![0; surface.edges.len() / 64 + 2];
+        self.begin.reset(surface.leaves.len());
+        self.places.reset(surface.vertices.len());
+        self.known.clear();
+        self.settled.clear();
+        self.settled.resize(surface.edges.len() / 64 + 2, 0);
     }
 
     /// Takes what is known of the vertices, and appends those that are inside to `open`.
@@ -73,15 +111,15 @@ impl Edges {
     /// Notes the distance of a vertex.
     #[inline(always)]
     pub(super) fn set(&mut self, vertex: u32, signed_distance: f64, tolerance: f64) {
-        let lower = (signed_distance.abs().min(tolerance) * ROUNDED_DOWN) as f32;
-        let lower = lower.max(f32::MIN_POSITIVE);
-        self.known[vertex as usize] = if signed_distance < 0.0 { -lower } else { lower };
+        if let Some(place) = (self.places.get(vertex) as usize).checked_sub(1) {
+            self.known[place] = lower(signed_distance, tolerance);
+        }
     }
 
-    /// Zero when that is not known.
+    /// The distance of the vertex at a place, zero when that is not known.
     #[inline(always)]
-    pub(super) fn distance(&self, vertex: u32) -> f32 {
-        self.known[vertex as usize]
+    pub(super) fn distance(&self, place: u32) -> f32 {
+        self.known[place as usize]
     }
 
     /// Marks edges of a leaf, by one bit each from the first.
@@ -108,7 +146,9 @@ impl Edges {
     #[inline(always)]
     pub(super) fn forget(&mut self, vertices: &[u32], leaves: impl Iterator<Item = u32>, surface: &Surface) {
         for &vertex in vertices {
-            self.known[vertex as usize] = 0.0;
+            if let Some(place) = (self.places.get(vertex) as usize).checked_sub(1) {
+                self.known[place] = 0.0;
+            }
         }
         for leaf in leaves {
             let word = surface.leaves[leaf as usize].first_edge as usize / 64;
@@ -119,9 +159,9 @@ impl Edges {
 
     /// Where the blocks of a leaf are.
     #[inline(always)]
-    pub(super) fn of(&mut self, surface: &Surface, index: u32) -> Range<usize> {
-        let begin = match self.begin[index as usize] {
-            0 => self.gather(surface, index),
+    pub(super) fn of(&mut self, surface: &Surface, index: u32, side: &Side, tolerance: f64) -> Range<usize> {
+        let begin = match self.begin.get(index) {
+            0 => self.gather(surface, index, side, tolerance),
             known => known as usize - 1,
         };
         begin..begin + edges_of(surface, index).len().div_ceil(LANES)
@@ -132,17 +172,16 @@ impl Edges {
         &self.blocks[index]
     }
 
-    fn gather(&mut self, surface: &Surface, index: u32) -> usize {
+    fn gather(&mut self, surface: &Surface, index: u32, side: &Side, tolerance: f64) -> usize {
         let begin = self.blocks.len();
-        self.begin[index as usize] = begin as u32 + 1;
+        self.begin.set(index, begin as u32 + 1);
         let origin = surface.blocks[index as usize].origin.map(f64::from);
         let range = edges_of(surface, index);
-        let edges = &surface.edges[range.start as usize..range.end as usize];
-        for eight in edges.chunks(LANES) {
+        for eight in surface.edges[range.start as usize..range.end as usize].chunks(LANES) {
             let mut block = EdgeBlock {
                 start: [[0.0; LANES]; 3],
                 along: [[0.0; LANES]; 3],
-                vertices: edges[0].vertices.map(|v| [v; LANES]),
+                places: eight[0].vertices.map(|v| [self.place(v, side, tolerance); LANES]),
             };
             for (lane, edge) in eight.iter().enumerate() {
                 let [a, b] = edge.vertices.map(|v| &surface.vertices[v as usize]);
@@ -150,14 +189,34 @@ impl Edges {
                     block.start[k][lane] = (a[k] - origin[k]) as f32;
                     block.along[k][lane] = (b[k] - a[k]) as f32;
                 }
-                block.vertices[0][lane] = edge.vertices[0];
-                block.vertices[1][lane] = edge.vertices[1];
+                for k in 0..2 {
+                    block.places[k][lane] = self.place(edge.vertices[k], side, tolerance);
+                }
             }
             self.blocks.push(block);
         }
         begin
     }
 
+    /// The place of a vertex, a new one with what is known of it if it has none.
+    fn place(&mut self, vertex: u32, side: &Side, tolerance: f64) -> u32 {
+        if let Some(place) = self.places.get(vertex).checked_sub(1) {
+            return place;
+        }
+        let signed_distance = side.signed_distance(vertex);
+        let known = if signed_distance.is_finite() { lower(signed_distance, tolerance) } else { 0.0 };
+        self.known.push(known);
+        self.places.set(vertex, self.known.len() as u32);
+        self.known.len() as u32 - 1
+    }
+}
+
+/// A number that is a little less than the distance or the tolerance, with the sign of the distance, and not zero.
+#[inline(always)]
+fn lower(signed_distance: f64, tolerance: f64) -> f32 {
+    let lower = (signed_distance.abs().min(tolerance) * ROUNDED_DOWN) as f32;
+    let lower = lower.max(f32::MIN_POSITIVE);
+    if signed_distance < 0.0 { -lower } else { lower }
 }
 
 /// One bit for each lane of block number `index` of so many edges that has one.

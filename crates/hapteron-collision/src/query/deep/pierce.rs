@@ -5,6 +5,7 @@
 
 use super::edges::{EdgeBlock, Edges, edges_of, filled};
 use crate::query::kernel::{bits, lanes, lanes_of};
+use crate::query::side::Side;
 use crate::surface::{LANES, Leaf, Surface, TriangleBlock};
 use crate::vector::{Rigid, Vec3};
 use fearless_simd::{Simd, f32x8, mask32x8, prelude::*, u32x8};
@@ -116,6 +117,8 @@ pub(super) struct Frame<'a, S> {
     /// From the own frame to the other's.
     pub motion: &'a Rigid,
     pub rotation: [[f32; 3]; 3],
+    pub exact_tolerance: f64,
+    /// The same, rounded down.
     pub tolerance: f32,
     /// Covers the rounding of single-precision coordinates, metres.
     pub slack: f32,
@@ -188,14 +191,14 @@ impl Batch {
     /// Takes the edges of a leaf that may run through a face: those with a far end that are longer than what their ends know to be
     /// empty. Gives by how much less the ends of the others may know before one of them may, too.
     #[inline(always)]
-    pub(super) fn take<S: Simd>(&mut self, frame: &Frame<'_, S>, edges: &mut Edges, leaf: u32, rows: &mut Rows) -> f32 {
+    pub(super) fn take<S: Simd>(&mut self, frame: &Frame<'_, S>, edges: &mut Edges, side: &Side, leaf: u32, rows: &mut Rows) -> f32 {
         let range = edges_of(frame.own, leaf);
-        let blocks = edges.of(frame.own, leaf);
+        let blocks = edges.of(frame.own, leaf, side, frame.exact_tolerance);
         let (mut count, mut known) = (0, 0);
         let mut spare = f32x8::splat(frame.simd, f32::INFINITY);
         for (index, block) in blocks.enumerate() {
             let block = edges.block(block);
-            let ends = [distances(edges, &block.vertices[0]), distances(edges, &block.vertices[1])];
+            let ends = [distances(edges, &block.places[0]), distances(edges, &block.places[1])];
             let part = Part::new(frame, block, ends);
             spare = spare.min(part.spare);
             known |= (bits(part.known) & filled(range.len(), index)) << (index * LANES);
@@ -322,10 +325,10 @@ fn eight_of<S: Simd, const N: usize>(simd: S, rows: &[[f32; ROOM]; N], at: usize
 }
 
 #[inline(always)]
-fn distances(edges: &Edges, vertices: &[u32; LANES]) -> [f32; LANES] {
+fn distances(edges: &Edges, places: &[u32; LANES]) -> [f32; LANES] {
     let mut result = [0.0; LANES];
     for lane in 0..LANES {
-        result[lane] = edges.distance(vertices[lane]);
+        result[lane] = edges.distance(places[lane]);
     }
     result
 }
