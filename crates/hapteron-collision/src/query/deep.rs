@@ -7,6 +7,9 @@
 
 mod edges;
 mod pierce;
+mod segments;
+#[cfg(test)]
+mod tests;
 
 use super::Pair;
 use super::feature::{Feature, Foot};
@@ -20,7 +23,8 @@ use crate::surface::{LANES, Surface};
 use crate::vector::{Rigid, Vec3, add, norm, scale, sub};
 use edges::Edges;
 use fearless_simd::Simd;
-use pierce::{Batch, Frame, Rows};
+use pierce::Batch;
+use segments::{Frame, Rows};
 use std::ops::Range;
 
 /// Lists to be reused.
@@ -89,7 +93,7 @@ impl<S> Dive<'_, S> {
             exact_tolerance: self.tolerance,
             tolerance: (self.tolerance * edges::ROUNDED_DOWN) as f32,
             slack: self.slack,
-            wide: pierce::WIDE * self.slack,
+            wide: segments::WIDE * self.slack,
         }
     }
 

@@ -29,6 +29,7 @@ impl Sparse {
         }
     }
 
+    #[inline(always)]
     fn set(&mut self, index: u32, number: u32) {
         let page = &mut self.pages[index as usize / PAGE];
         if *page == 0 {
@@ -84,7 +85,10 @@ impl Edges {
         self.blocks.reserve(2 * leaves + leaves / 4);
         self.begin.reset(surface.leaves.len());
         self.places.reset(surface.vertices.len());
+        self.begin.numbers.reserve(leaves.min(4));
+        self.places.numbers.reserve(leaves);
         self.known.clear();
+        self.known.reserve(8 * leaves);
         self.settled.clear();
         self.settled.resize(surface.edges.len() / 64 + 2, 0);
     }
@@ -178,27 +182,30 @@ impl Edges {
         let origin = surface.blocks[index as usize].origin.map(f64::from);
         let range = edges_of(surface, index);
         for eight in surface.edges[range.start as usize..range.end as usize].chunks(LANES) {
-            let mut block = EdgeBlock {
-                start: [[0.0; LANES]; 3],
-                along: [[0.0; LANES]; 3],
-                places: eight[0].vertices.map(|v| [self.place(v, side, tolerance); LANES]),
-            };
+            let (mut start, mut along) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+            let mut places = [[0; LANES]; 2];
             for (lane, edge) in eight.iter().enumerate() {
                 let [a, b] = edge.vertices.map(|v| &surface.vertices[v as usize]);
                 for k in 0..3 {
-                    block.start[k][lane] = (a[k] - origin[k]) as f32;
-                    block.along[k][lane] = (b[k] - a[k]) as f32;
+                    start[k][lane] = (a[k] - origin[k]) as f32;
+                    along[k][lane] = (b[k] - a[k]) as f32;
                 }
                 for k in 0..2 {
-                    block.places[k][lane] = self.place(edge.vertices[k], side, tolerance);
+                    places[k][lane] = self.place(edge.vertices[k], side, tolerance);
                 }
             }
+            for places in &mut places {
+                let first = places[0];
+                places[eight.len()..].fill(first);
+            }
+            let block = EdgeBlock { start, along, places };
             self.blocks.push(block);
         }
         begin
     }
 
     /// The place of a vertex, a new one with what is known of it if it has none.
+    #[inline(always)]
     fn place(&mut self, vertex: u32, side: &Side, tolerance: f64) -> u32 {
         if let Some(place) = self.places.get(vertex).checked_sub(1) {
             return place;
