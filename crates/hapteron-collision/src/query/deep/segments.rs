@@ -224,7 +224,7 @@ impl<S: Simd> Moved<S> {
         let zero = f32x8::splat(simd, 0.0);
         let (mut low, mut high) = (start, start);
         for k in 0..3 {
-            start[k] = start[k] + block.origin[0][k];
+            start[k] += block.origin[0][k];
             low[k] = start[k] + along[k].min(zero);
             high[k] = start[k] + along[k].max(zero);
         }
