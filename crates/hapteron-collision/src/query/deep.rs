@@ -5,37 +5,57 @@
 //! to further ones, unless they have come out through a face: each vertex found gets its exact foot, whatever its depth. Only a
 //! closed and oriented surface has an inside; behind an open one nothing is followed.
 
+mod edges;
+mod pierce;
+mod segments;
+#[cfg(test)]
+mod tests;
+
 use super::Pair;
 use super::feature::{Feature, Foot};
-use super::kernel;
-use super::kernel::Lanes;
 use super::nearest::Nearest;
 use super::result::{Found, Sink};
-use super::ridge_kernel::SegmentBlock;
 use super::ridges::pierces;
 use super::side::{Clear, Side};
 use super::vertices::{push_body_vertex, push_obstacle_vertex};
-use super::walk::{Neighbourhood, Neighbours};
+use super::walk::Neighbours;
 use crate::surface::{LANES, Surface};
-use crate::vector::{Rigid, Vec3, add, dot, norm, scale, sub};
-use fearless_simd::{Simd, prelude::*};
+use crate::vector::{Rigid, Vec3, add, norm, scale, sub};
+use edges::Edges;
+use fearless_simd::Simd;
+use pierce::Batch;
+use segments::{Frame, Rows};
 use std::ops::Range;
 
 /// Lists to be reused.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Memory {
-    /// Vertices inside whose edges are to be followed.
-    open: Vec<u32>,
-    /// Edges that run through an odd number of faces: one end is inside, the other outside.
-    crossed: Vec<u32>,
-    /// Edges of a leaf that may run through something no vertex shows, and eight at a time.
-    probes: Vec<Probe>,
-    segments: Vec<SegmentBlock>,
-    /// Which of them run through faces, and where, as a share of the edge.
-    crossings: Vec<(u32, f64)>,
-    nearest: Nearest,
+    /// Of the body and the obstacle.
+    edges: [Edges; 2],
+    batch: Batch,
+    search: Search,
     /// By neighbourhood of the last walk, for the body and the obstacle: until when no leaf can touch it.
     pub apart: [Vec<Clear>; 2],
+}
+
+/// What serves to look where single vertices lie.
+#[derive(Clone, Debug, Default)]
+struct Search {
+    /// Vertices inside whose edges are to be followed.
+    open: Vec<u32>,
+    /// Where edges run through faces that may have both ends outside.
+    crossings: Vec<Crossing>,
+    nearest: Nearest,
+}
+
+/// Where an edge of a leaf runs through a face, as a share of the edge.
+#[derive(Clone, Copy, Debug)]
+struct Crossing {
+    leaf: u32,
+    edge: u32,
+    share: f64,
+    /// Both ends of the edge were looked at before.
+    known: bool,
 }
 
 /// A point of one surface inside the other, in the frame of that one.
@@ -43,16 +63,6 @@ pub(super) struct Memory {
 enum Inside {
     Vertex(u32, Vec3),
     Edge(u32, Vec3),
-}
-
-/// An edge, and where it is in the other surface's frame.
-#[derive(Clone, Copy, Debug)]
-struct Probe {
-    edge: u32,
-    start: Vec3,
-    along: Vec3,
-    /// The part of it, as shares, beyond what its ends know to be empty.
-    part: [f64; 2],
 }
 
 /// One surface in the other one.
@@ -70,6 +80,23 @@ struct Dive<'a, S> {
 }
 
 impl<S> Dive<'_, S> {
+    fn frame(&self) -> Frame<'_, S>
+    where
+        S: Simd,
+    {
+        Frame {
+            simd: self.simd,
+            own: self.own,
+            other: self.other,
+            motion: self.motion,
+            rotation: self.motion.rotation.map(|row| row.map(|c| c as f32)),
+            exact_tolerance: self.tolerance,
+            tolerance: (self.tolerance * edges::ROUNDED_DOWN) as f32,
+            slack: self.slack,
+            wide: segments::WIDE * self.slack,
+        }
+    }
+
     /// The weight of a contact in the middle of an edge: it begins where the edge comes through the surface, where any other contact already
     /// presses, and must not begin with a blow.
     fn share(&self, foot: &Foot) -> f64 {
@@ -143,136 +170,135 @@ fn run<S: Simd>(
     memory: &mut Memory,
     mut push: impl FnMut(Inside, &Foot),
 ) {
-    if !dive.other.closed {
+    if !dive.other.closed || (neighbours.of.is_empty() && side.found().is_empty()) {
         return;
     }
-    memory.open.clear();
-    memory.open.extend(side.found().iter().copied().filter(|&v| side.signed_distance(v) < 0.0));
-    memory.crossed.clear();
-    for (i, &Neighbourhood { leaf, begin, end }) in neighbours.of.iter().enumerate() {
-        if memory.apart[dive.which][i].holds(dive.travelled, 0.0) {
+    let Memory { edges, batch, search, apart } = memory;
+    let (edges, apart) = (&mut edges[dive.which], &mut apart[dive.which]);
+    let frame = dive.frame();
+    edges.expect(dive.own, neighbours.of.len());
+    edges.take(side, dive.tolerance, &mut search.open);
+    let mut rows = Rows::EMPTY;
+    batch.clear();
+    for (of, apart) in neighbours.of.iter().zip(apart) {
+        if apart.holds(dive.travelled, 0.0) {
             continue;
         }
-        let spare = long_edges(dive, leaf, side, memory);
-        let apart = cross_leaves(dive, &neighbours.near[begin as usize..end as usize], memory);
+        let first = batch.segments().len();
+        let spare = batch.take(&frame, edges, side, of.leaf, &mut rows);
+        let near = &neighbours.near[of.begin as usize..of.end as usize];
+        let clear = spare.min(0.5 * batch.meet(&frame, first, near));
         // As the body travels, what is known of an edge's ends shrinks as well.
-        memory.apart[dive.which][i] = Clear::new(0.5 * spare.min(f64::from(apart)), dive.travelled);
-        let mut rest = memory.crossings.len();
-        while rest > 0 {
-            let edge = memory.crossings[rest - 1].0;
-            let first = memory.crossings[..rest].partition_point(|c| c.0 < edge);
-            follow(dive, edge, first..rest, side, memory, &mut push);
-            rest = first;
+        *apart = Clear::new(f64::from(clear), dive.travelled);
+        if batch.is_full() {
+            batch.pierce(&frame);
+            settle(dive, side, batch, edges, search, &mut push);
+            batch.clear();
         }
     }
-    memory.crossed.sort_unstable();
-    while let Some(vertex) = memory.open.pop() {
+    batch.pierce(&frame);
+    settle(dive, side, batch, edges, search, &mut push);
+    while let Some(vertex) = search.open.pop() {
         for &edge in dive.own.edges_at(vertex) {
+            if edges.is_settled(edge) {
+                continue;
+            }
             let [a, b] = dive.own.edges[edge as usize].vertices;
             let other = if a == vertex { b } else { a };
-            if side.signed_distance(other).is_infinite() && memory.crossed.binary_search(&edge).is_err() {
+            if side.signed_distance(other).is_infinite() {
                 let within = side.signed_distance(vertex).abs() + length(dive.own, edge);
-                look(dive, other, within, side, memory, &mut push);
+                look(dive, other, within, side, edges, search, &mut push);
             }
         }
+    }
+    edges.forget(side.found(), neighbours.of.iter().map(|of| of.leaf), dive.own);
+}
+
+/// Looks at what has been pierced, in the order of the leaves.
+#[inline(always)]
+fn settle<S: Simd>(
+    dive: &Dive<'_, S>,
+    side: &mut Side,
+    batch: &mut Batch,
+    edges: &mut Edges,
+    search: &mut Search,
+    push: &mut impl FnMut(Inside, &Foot),
+) {
+    search.crossings.clear();
+    for index in 0..batch.hits() {
+        let hit = batch.hit(index);
+        let segments = &batch.segments()[hit.block];
+        let (leaf, edge) = (segments.leaf, segments.edges[hit.lane]);
+        if segments.begins_inside(hit.lane) {
+            // It matters no more than whether the other end is outside.
+            let mut odd = hit.surely.count_ones() & 1;
+            if hit.maybe != hit.surely {
+                exactly(dive, edge, hit.leaf, hit.maybe & !hit.surely, |_| odd ^= 1);
+            }
+            edges.toggle(edge, odd);
+        } else {
+            exactly(dive, edge, hit.leaf, hit.maybe, |share| {
+                search.crossings.push(Crossing { leaf, edge, share, known: false });
+            });
+        }
+    }
+    if !search.crossings.is_empty() {
+        follow_all(dive, side, edges, search, push);
+    }
+}
+
+/// Gives the places where an edge runs through triangles of a leaf, one bit each.
+#[inline(always)]
+fn exactly<S>(dive: &Dive<'_, S>, edge: u32, leaf: u32, mut triangles: u32, mut found: impl FnMut(f64)) {
+    let [a, b] = dive.own.edges[edge as usize].vertices.map(|v| dive.own.vertices[v as usize]);
+    let (start, along) = (dive.motion.point(a), dive.motion.direction(sub(b, a)));
+    let first = dive.other.leaves[leaf as usize].first_triangle;
+    while triangles != 0 {
+        let triangle = first + triangles.trailing_zeros();
+        triangles &= triangles - 1;
+        let corners = dive.other.triangles[triangle as usize].map(|v| dive.other.vertices[v as usize]);
+        if let Some(share) = pierces(start, along, corners) {
+            found(share);
+        }
+    }
+}
+
+/// Follows the edges that run through faces, leaf by leaf.
+fn follow_all<S: Simd>(
+    dive: &Dive<'_, S>,
+    side: &mut Side,
+    edges: &mut Edges,
+    search: &mut Search,
+    push: &mut impl FnMut(Inside, &Foot),
+) {
+    // They come leaf by leaf.
+    let mut begin = 0;
+    while begin < search.crossings.len() {
+        let leaf = search.crossings[begin].leaf;
+        let mut rest = begin + search.crossings[begin..].iter().take_while(|c| c.leaf == leaf).count();
+        let of_leaf = &mut search.crossings[begin..rest];
+        of_leaf.sort_unstable_by(|a, b| a.edge.cmp(&b.edge).then(a.share.total_cmp(&b.share)));
+        // One whose ends have been looked at since shows nothing.
+        for crossing in of_leaf {
+            let ends = dive.own.edges[crossing.edge as usize].vertices;
+            crossing.known = ends.iter().all(|&v| side.signed_distance(v).is_finite());
+        }
+        let end = rest;
+        while rest > begin {
+            let Crossing { edge, known, .. } = search.crossings[rest - 1];
+            let first = begin + search.crossings[begin..rest].partition_point(|c| c.edge < edge);
+            if !known {
+                follow(dive, edge, first..rest, side, edges, search, push);
+            }
+            rest = first;
+        }
+        begin = end;
     }
 }
 
 fn length(surface: &Surface, edge: u32) -> f64 {
     let [a, b] = surface.edges[edge as usize].vertices.map(|v| surface.vertices[v as usize]);
     norm(sub(b, a))
-}
-
-/// Collects the edges of a leaf with an end that is far, if they may run through a face. A known end is as far from there as it is from the
-/// surface, any other one farther than the tolerance: only what is left between is looked at. Gives how much the others lack.
-#[inline(always)]
-fn long_edges<S>(dive: &Dive<'_, S>, leaf: u32, side: &Side, memory: &mut Memory) -> f64 {
-    let surface = dive.own;
-    let next = surface.leaves.get(leaf as usize + 1);
-    let end = next.map_or(surface.edges.len() as u32, |next| next.first_edge);
-    memory.probes.clear();
-    memory.segments.clear();
-    let mut spare = f64::INFINITY;
-    for edge in surface.leaves[leaf as usize].first_edge..end {
-        let vertices = surface.edges[edge as usize].vertices;
-        let known = [side.signed_distance(vertices[0]), side.signed_distance(vertices[1])];
-        if known.iter().all(|s| s.is_finite()) {
-            spare = spare.min(dive.tolerance - known[0].max(known[1]));
-            continue;
-        }
-        let empty = known.map(|s| s.abs().min(dive.tolerance));
-        let [a, b] = vertices.map(|v| surface.vertices[v as usize]);
-        let along = sub(b, a);
-        let (squared, sum) = (dot(along, along), empty[0] + empty[1]);
-        if squared <= sum * sum {
-            spare = spare.min(sum - squared.sqrt());
-            continue;
-        }
-        let inverse = 1.0 / squared.sqrt();
-        let (start, along) = (dive.motion.point(a), dive.motion.direction(along));
-        let lane = memory.probes.len() % LANES;
-        if lane == 0 {
-            memory.segments.push(SegmentBlock::EMPTY);
-        }
-        let part = [empty[0] * inverse, 1.0 - empty[1] * inverse];
-        if let Some(block) = memory.segments.last_mut() {
-            block.set(lane, ends(start, along, part));
-        }
-        memory.probes.push(Probe { edge, start, along, part });
-    }
-    spare
-}
-
-/// Finds where the collected edges run through triangles of the near leaves, in the order of the edges. Gives how far away at least any of
-/// them is from any leaf.
-#[inline(always)]
-fn cross_leaves<S: Simd>(dive: &Dive<'_, S>, near: &[u32], memory: &mut Memory) -> f32 {
-    memory.crossings.clear();
-    if memory.probes.is_empty() {
-        return f32::INFINITY;
-    }
-    let mut apart = Lanes::splat(dive.simd, f32::INFINITY);
-    for &index in near {
-        let leaf = &dive.other.leaves[index as usize];
-        for (eight, block) in memory.segments.iter().enumerate() {
-            let own = block.apart(dive.simd, leaf, dive.slack);
-            apart = apart.min(own);
-            let mut mask = kernel::bits(own.simd_le(0.0));
-            while mask != 0 {
-                let probe = &memory.probes[eight * LANES + mask.trailing_zeros() as usize];
-                mask &= mask - 1;
-                cross_leaf(dive, probe, index, &mut memory.crossings);
-            }
-        }
-    }
-    memory.crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    apart.reduce_min()
-}
-
-/// The ends of a part of an edge, in single precision.
-#[inline(always)]
-fn ends(start: Vec3, along: Vec3, part: [f64; 2]) -> [[f32; 3]; 2] {
-    let mut result = [[0.0; 3]; 2];
-    for (end, share) in result.iter_mut().zip(part) {
-        for k in 0..3 {
-            end[k] = (start[k] + along[k] * share) as f32;
-        }
-    }
-    result
-}
-
-#[inline(always)]
-fn cross_leaf<S: Simd>(dive: &Dive<'_, S>, probe: &Probe, index: u32, found: &mut Vec<(u32, f64)>) {
-    let (leaf, block) = (&dive.other.leaves[index as usize], &dive.other.blocks[index as usize]);
-    let from = sub(probe.start, block.origin.map(f64::from));
-    let ends = ends(from, probe.along, probe.part);
-    let mut mask = kernel::pierced_triangles(dive.simd, ends, block) & ((1 << leaf.triangles) - 1);
-    while mask != 0 {
-        let triangle = leaf.first_triangle + mask.trailing_zeros();
-        mask &= mask - 1;
-        let corners = dive.other.triangles[triangle as usize].map(|v| dive.other.vertices[v as usize]);
-        found.extend(pierces(probe.start, probe.along, corners).map(|share| (probe.edge, share)));
-    }
 }
 
 /// Looks where the ends of an edge lie that runs through faces, as far as that is not known from the number of faces.
@@ -282,12 +308,13 @@ fn follow<S: Simd>(
     edge: u32,
     crossings: Range<usize>,
     side: &mut Side,
-    memory: &mut Memory,
+    edges: &mut Edges,
+    search: &mut Search,
     push: &mut impl FnMut(Inside, &Foot),
 ) {
     let odd = crossings.len() % 2 == 1;
     if odd {
-        memory.crossed.push(edge);
+        edges.settle(edge, 1);
     }
     let length = length(dive.own, edge);
     let mut ends = dive.own.edges[edge as usize].vertices;
@@ -295,13 +322,13 @@ fn follow<S: Simd>(
         ends.swap(0, 1);
     }
     // Where the number of faces is even, both ends lie on the same side.
-    if look(dive, ends[0], length, side, memory, push) {
+    if look(dive, ends[0], length, side, edges, search, push) {
         return;
     }
     if odd {
-        look(dive, ends[1], length, side, memory, push);
+        look(dive, ends[1], length, side, edges, search, push);
     } else if !(side.signed_distance(ends[1]) < 0.0) {
-        between_crossings(dive, edge, crossings, memory, push);
+        between_crossings(dive, edge, crossings, search, push);
     }
 }
 
@@ -312,7 +339,8 @@ fn look<S: Simd>(
     vertex: u32,
     within: f64,
     side: &mut Side,
-    memory: &mut Memory,
+    edges: &mut Edges,
+    search: &mut Search,
     push: &mut impl FnMut(Inside, &Foot),
 ) -> bool {
     let known = side.signed_distance(vertex);
@@ -320,13 +348,14 @@ fn look<S: Simd>(
         return known < 0.0;
     }
     let point = dive.motion.point(dive.own.vertices[vertex as usize]);
-    let Some((triangle, foot)) = memory.nearest.foot(dive.simd, dive.other, point, within, dive.slack) else {
+    let Some((triangle, foot)) = search.nearest.foot(dive.simd, dive.other, point, within, dive.slack) else {
         return false;
     };
     // Outside is remembered as well, so that no vertex is looked at twice.
     side.set(vertex, foot.signed_distance, triangle / LANES as u32);
+    edges.set(vertex, foot.signed_distance, dive.tolerance);
     if foot.signed_distance < 0.0 {
-        memory.open.push(vertex);
+        search.open.push(vertex);
         push(Inside::Vertex(vertex, point), &foot);
         return true;
     }
@@ -339,16 +368,16 @@ fn between_crossings<S: Simd>(
     dive: &Dive<'_, S>,
     edge: u32,
     crossings: Range<usize>,
-    memory: &mut Memory,
+    search: &mut Search,
     push: &mut impl FnMut(Inside, &Foot),
 ) {
     let [a, b] = dive.own.edges[edge as usize].vertices.map(|v| dive.own.vertices[v as usize]);
     let length = length(dive.own, edge);
-    for pair in memory.crossings[crossings].windows(2) {
-        let (from, to) = (pair[0].1, pair[1].1);
+    for pair in search.crossings[crossings].windows(2) {
+        let (from, to) = (pair[0].share, pair[1].share);
         let point = dive.motion.point(add(a, scale(sub(b, a), 0.5 * (from + to))));
         let within = (to - from) * length;
-        if let Some((_, foot)) = memory.nearest.foot(dive.simd, dive.other, point, within, dive.slack)
+        if let Some((_, foot)) = search.nearest.foot(dive.simd, dive.other, point, within, dive.slack)
             && foot.signed_distance < 0.0
         {
             push(Inside::Edge(edge, point), &foot);

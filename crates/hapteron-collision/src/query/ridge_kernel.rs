@@ -10,32 +10,6 @@ use fearless_simd::{Simd, prelude::*};
 /// place each, and the rounding of what they start from.
 const ERROR: f32 = 3e-6;
 
-/// Up to sixteen segments.
-#[derive(Clone, Debug)]
-#[repr(align(64))]
-pub(super) struct SegmentBlock {
-    pub ends: [[[f32; LANES]; 3]; 2],
-}
-
-impl SegmentBlock {
-    /// Lanes that are near nothing: so far away that they never are the closest, but not so far that a height is not a number.
-    pub(super) const EMPTY: Self = Self { ends: [[[1e30; LANES]; 3]; 2] };
-
-    #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, ends: [[f32; 3]; 2]) {
-        for axis in 0..3 {
-            self.ends[0][axis][lane] = ends[0][axis];
-            self.ends[1][axis][lane] = ends[1][axis];
-        }
-    }
-
-    /// Lower bounds of the distances to a leaf; not positive where they may meet its bounds.
-    #[inline(always)]
-    pub(super) fn apart<S: Simd>(&self, simd: S, leaf: &Leaf, slack: f32) -> Lanes<S> {
-        Segments::new(lanes_of(simd, &self.ends[0]), lanes_of(simd, &self.ends[1])).apart(leaf) - slack
-    }
-}
-
 /// Segments with their boxes.
 #[derive(Clone, Copy)]
 pub(super) struct Segments<S: Simd> {
@@ -268,13 +242,16 @@ mod tests {
         let mesh = TriMesh::new(vec![[0.0; 3], [1.0, 0.0, -1.0], [0.0, 1.0, 1.0]], vec![[0, 1, 2]]).unwrap();
         let surface = Surface::build(&mesh);
         for edges in 1..=LANES {
-            let mut block = SegmentBlock::EMPTY;
+            let mut block = RidgeBlock::EMPTY;
             for lane in 0..edges {
-                let x = 3.0 + (edges - lane) as f32;
-                block.set(lane, [[x, 0.0, 0.0], [x, 1.0, 0.0]]);
+                let x = 3.0 + (edges - lane) as f64;
+                block.set(lane, [[x, 0.0, 0.0], [x, 1.0, 0.0]], [1.0, 0.0, 0.0], 1.0);
             }
+            let turn = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            let mut moved = MovedRidges::EMPTY;
             let least = dispatch!(Level::new(), simd => {
-                block.apart(simd, &surface.leaves[0], 0.0).reduce_min()
+                block.finish(simd, edges, 1e30);
+                moved.set(simd, &block, &turn, [0.0; 3]).apart(&surface.leaves[0]).reduce_min()
             });
             assert_eq!(least, 3.0, "{edges}");
         }
