@@ -10,7 +10,7 @@ use super::bounds::{self, Bounds, Boxes, MovedChildren, Slab};
 use super::kernel::{LaneMask, LaneNumbers, bits};
 use crate::surface::{EMPTY, LANES, LEAF, Node, Surface};
 use crate::vector::{Rigid, Vec3, norm};
-use corners::{Columns, CornerStore, Corners};
+use corners::{Columns, Corners};
 use fearless_simd::{Simd, prelude::*};
 use gathered::{Close, Gathered};
 use inversion::Inversion;
@@ -28,7 +28,6 @@ pub(super) struct Walk {
     gathered: Gathered,
     close: Close,
     corners: Corners,
-    store: CornerStore,
     inversion: Inversion,
     /// Leaves that may be closer than what was asked for.
     pub near: Pairs,
@@ -67,7 +66,6 @@ pub(super) fn walk<S: Simd>(simd: S, pair: Pair<'_>, ahead: f64, walk: &mut Walk
     walk.touching.body.of.clear();
     walk.candidates.clear();
     walk.stack.clear();
-    walk.store.serve(pair.body);
     if !(pair.body.nodes.is_empty() || pair.obstacle.nodes.is_empty()) {
         let touching = (ahead + pair.slack()) as f32;
         let margins = Margins { near: (pair.tolerance + ahead + pair.slack()) as f32, touching };
@@ -225,9 +223,10 @@ fn meet_leaf<S: Simd>(
     columns: &Columns<S>,
     margins: Margins,
 ) {
-    let Walk { gathered, close, corners, store, near, touching, .. } = walk;
-    corners.take(simd, pair.body, index, store, columns);
-    let slab = Slab::of(&pair.body.leaves[index as usize], pair.motion);
+    let Walk { gathered, close, corners, near, touching, .. } = walk;
+    let leaf = &pair.body.leaves[index as usize];
+    corners.take(simd, pair.body, leaf, columns);
+    let slab = Slab::of(leaf, pair.motion);
     let mut lists = [near.body.list(), touching.body.list()];
     gathered.meet(simd, corners, &slab, margins, close, &mut lists);
     let [near_end, touching_end] = [lists[0].len, lists[1].len];

@@ -64,6 +64,7 @@ pub(super) fn surface(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Surface {
         closed: false,
         blocks: Vec::new(),
         leaves: Vec::new(),
+        corners: Vec::new(),
         nodes: Vec::new(),
         radius,
         identity: 0,
@@ -187,6 +188,8 @@ fn renumber(surface: &mut Surface, builder: &Builder) {
             first_triangle: branch.begin as u32,
             first_vertex: first_vertex as u32,
             first_edge: first_edge as u32,
+            first_corner: 0,
+            corners: 0,
             triangles: own.len() as u8,
             vertices: (vertex_order.len() - first_vertex) as u8,
             ridges: edge_order[first_edge..].iter().filter(|&&e| ridge(e)).count() as u8,
@@ -211,6 +214,16 @@ fn renumber(surface: &mut Surface, builder: &Builder) {
         *triangles = triangles.map(|t| new_triangle[t as usize]);
     }
     surface.blocks = surface.leaves.iter().map(|leaf| TriangleBlock::new(surface, leaf)).collect();
+    for leaf in &mut surface.leaves {
+        let triangles = &surface.triangles[leaf.first_triangle as usize..][..usize::from(leaf.triangles)];
+        let mut corners: Vec<u32> = triangles.iter().flatten().copied().collect();
+        corners.sort_unstable();
+        corners.dedup();
+        corners.resize(corners.len().next_multiple_of(2), corners[0]);
+        leaf.first_corner = surface.corners.len() as u32;
+        leaf.corners = corners.len() as u8;
+        surface.corners.append(&mut corners);
+    }
 }
 
 /// The mean normal of some triangles and the heights along it between which they lie.

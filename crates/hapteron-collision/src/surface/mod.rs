@@ -111,8 +111,12 @@ pub(crate) struct Leaf {
     pub first_triangle: u32,
     pub first_vertex: u32,
     pub first_edge: u32,
+    /// Of the list of corners.
+    pub first_corner: u32,
     pub triangles: u8,
     pub vertices: u8,
+    /// Distinct vertices of its triangles, own ones and others; an even number, for which one may be there twice.
+    pub corners: u8,
     /// Edges that can touch in their middle (all but [`EdgeKind::Hollow`]); they come first.
     pub ridges: u8,
 }
@@ -173,6 +177,8 @@ pub struct Surface {
     pub(crate) closed: bool,
     pub(crate) blocks: Vec<TriangleBlock>,
     pub(crate) leaves: Vec<Leaf>,
+    /// Vertices of the triangles, leaf by leaf.
+    pub(crate) corners: Vec<u32>,
     /// The root is the first.
     pub(crate) nodes: Vec<Node>,
     pub(crate) radius: f64,
@@ -190,6 +196,12 @@ impl Surface {
     /// The same for triangles that are known to be sound.
     pub(crate) fn of_triangles(vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Self {
         build::surface(vertices, triangles)
+    }
+
+    /// The vertices of a leaf's triangles.
+    #[inline(always)]
+    pub(crate) fn corners(&self, leaf: &Leaf) -> &[u32] {
+        &self.corners[leaf.first_corner as usize..][..usize::from(leaf.corners)]
     }
 
     /// The edges that end at a vertex.
@@ -226,6 +238,7 @@ impl Surface {
             + bytes(&self.edges_at)
             + bytes(&self.blocks)
             + bytes(&self.leaves)
+            + bytes(&self.corners)
             + bytes(&self.nodes)
     }
 }

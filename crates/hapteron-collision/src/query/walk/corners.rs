@@ -1,69 +1,12 @@
 //! The distinct corners of leaves, which are fewer than those of their triangles.
 
 use super::super::kernel::Lanes;
-use crate::surface::{LANES, Surface};
+use crate::surface::{LANES, Leaf, Surface};
 use crate::vector::Rigid;
 use fearless_simd::{Simd, f32x8, f64x4, prelude::*};
 
 /// A leaf's triangles have no more corners than this.
 const MOST: usize = 3 * LANES;
-/// Entries of the table that finds corners again: most have one to themselves.
-const SLOTS: usize = 64;
-
-/// Lists of corners of the leaves that walks have come across. They do not depend on the pose, so what one walk needed serves the next ones.
-/// Kept here and not in the surface, most leaves of which no walk ever comes to.
-#[derive(Clone, Debug, Default)]
-pub(super) struct CornerStore {
-    surface: u64,
-    /// By leaf: where its list ends, plus one; zero when nobody has asked for it.
-    places: Vec<u32>,
-    /// Lists of vertices, each followed by its length; an even number in each.
-    vertices: Vec<u32>,
-}
-
-impl CornerStore {
-    /// Forgets those of another surface.
-    pub(super) fn serve(&mut self, surface: &Surface) {
-        if self.surface != surface.identity || self.places.len() != surface.leaves.len() {
-            self.surface = surface.identity;
-            self.vertices.clear();
-            self.places.clear();
-            self.places.resize(surface.leaves.len(), 0);
-        }
-    }
-
-    /// The vertices at the corners of a leaf's triangles.
-    #[inline(always)]
-    fn of(&mut self, surface: &Surface, leaf: u32) -> &[u32] {
-        if self.places[leaf as usize] == 0 {
-            self.list(surface, leaf);
-        }
-        let end = self.places[leaf as usize] as usize - 1;
-        &self.vertices[end - self.vertices[end] as usize..end]
-    }
-
-    fn list(&mut self, surface: &Surface, leaf: u32) {
-        let own = &surface.leaves[leaf as usize];
-        let first = own.first_triangle as usize;
-        let mut table = [u32::MAX; SLOTS];
-        let (mut corners, mut count) = ([0; SLOTS], 0);
-        for triangle in &surface.triangles[first..first + usize::from(own.triangles)] {
-            for &vertex in triangle {
-                // One that is not found again is listed twice, which does no harm.
-                let slot = &mut table[vertex as usize % SLOTS];
-                corners[count % SLOTS] = vertex;
-                count += usize::from(*slot != vertex);
-                *slot = vertex;
-            }
-        }
-        corners[count] = corners[0];
-        count = count.next_multiple_of(2);
-        self.vertices.extend_from_slice(&corners[..count]);
-        self.vertices.push(count as u32);
-        self.places[leaf as usize] = self.vertices.len() as u32;
-    }
-}
-
 /// A rigid motion by its columns.
 #[derive(Clone, Copy)]
 pub(super) struct Columns<S: Simd> {
@@ -101,15 +44,8 @@ pub(super) struct Corners {
 impl Corners {
     /// Takes those of a leaf.
     #[inline(always)]
-    pub(super) fn take<S: Simd>(
-        &mut self,
-        simd: S,
-        surface: &Surface,
-        leaf: u32,
-        store: &mut CornerStore,
-        columns: &Columns<S>,
-    ) {
-        let list = store.of(surface, leaf);
+    pub(super) fn take<S: Simd>(&mut self, simd: S, surface: &Surface, leaf: &Leaf, columns: &Columns<S>) {
+        let list = surface.corners(leaf);
         let (mut low, mut high) = (f32x8::splat(simd, f32::INFINITY), f32x8::splat(simd, f32::NEG_INFINITY));
         for (two, at) in list.as_chunks::<2>().0.iter().zip(&mut self.at) {
             let a = columns.point(simd, &surface.vertices[two[0] as usize]);
