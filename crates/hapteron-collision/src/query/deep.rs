@@ -243,7 +243,11 @@ fn settle<S: Simd>(
         }
     }
     if !search.crossings.is_empty() {
-        follow_all(dive, side, edges, search, push);
+        // Rarely needed, so a function of its own.
+        dive.simd.vectorize(
+            #[inline(always)]
+            || follow_all(dive, side, edges, search, push),
+        );
     }
 }
 
@@ -264,6 +268,7 @@ fn exactly<S>(dive: &Dive<'_, S>, edge: u32, leaf: u32, mut triangles: u32, mut 
 }
 
 /// Follows the edges that run through faces, leaf by leaf.
+#[inline(always)]
 fn follow_all<S: Simd>(
     dive: &Dive<'_, S>,
     side: &mut Side,

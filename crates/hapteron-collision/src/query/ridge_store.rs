@@ -3,7 +3,7 @@
 //! They do not depend on the pose, so what one query needed serves the next ones. Kept here and not in the surface, most leaves of which no
 //! query ever asks for.
 
-use super::kernel::{Lanes, lanes, lanes_of};
+use super::kernel::{LaneNumbers, Lanes, NUMBERS, lanes, lanes_of};
 use crate::surface::{Cone, LANES, Surface};
 use crate::vector::{Vec3, sub};
 use fearless_simd::{Simd, prelude::*};
@@ -62,17 +62,13 @@ impl RidgeBlock {
         // An edge without a length has no direction, and is never refused for it.
         let inverse = length.simd_gt(TINY).select(Lanes::splat(simd, 1.0) / length, zero);
         let along = [vector[0] * inverse, vector[1] * inverse, vector[2] * inverse];
+        let filled = LaneNumbers::load_array_ref(simd, &NUMBERS).simd_lt(edges as u32);
         self.length = length.to_array();
         for k in 0..3 {
-            for lane in edges..LANES {
-                self.start[k][lane] = self.start[k][0];
-            }
-            let start = lanes(simd, &self.start[k]);
+            let start = filled.select(lanes(simd, &self.start[k]), Lanes::splat(simd, self.start[k][0]));
             let end = start + vector[k];
             (self.low[k], self.high[k]) = (start.min(end).reduce_min(), start.max(end).reduce_max());
-            for lane in edges..LANES {
-                self.start[k][lane] = empty;
-            }
+            self.start[k] = filled.select(start, Lanes::splat(simd, empty)).to_array();
             let (l, m) = ((k + 1) % 3, (k + 2) % 3);
             self.along[k] = along[k].to_array();
             self.across[k] = (along[l] * axis[m] - along[m] * axis[l]).to_array();
@@ -174,15 +170,16 @@ impl RidgeStore {
         let mut first = leaf.first_edge;
         let edges = first as usize..first as usize + usize::from(leaf.ridges);
         for edges in surface.edges[edges].chunks(LANES) {
-            let mut block = RidgeBlock { first, ..RidgeBlock::EMPTY };
+            self.blocks.push(RidgeBlock::EMPTY);
+            let Some(block) = self.blocks.last_mut() else { continue };
+            block.first = first;
             first += LANES as u32;
-            for (lane, edge) in edges.iter().enumerate() {
+            for (lane, edge) in edges.iter().enumerate().take(LANES) {
                 let [a, b] = edge.vertices;
                 let (a, b) = (surface.vertices[a as usize], surface.vertices[b as usize]);
                 block.set(lane, [sub(a, origin), sub(b, origin)], edge.normal, Cone::wide_cos(edge.cone));
             }
             block.finish(simd, edges.len(), empty);
-            self.blocks.push(block);
         }
         let place = Place::new(begin, self.blocks.len() - begin);
         self.places[index as usize] = place;
