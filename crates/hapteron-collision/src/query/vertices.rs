@@ -1,5 +1,7 @@
 //! For every vertex near the other surface its foot there, its side and its contact.
 
+mod lists;
+
 use super::Pair;
 use super::feature::{self, Feature, Foot};
 use super::kernel::{self, LaneNumbers, Lanes};
@@ -9,6 +11,14 @@ use super::walk::{Neighbourhood, Neighbours};
 use crate::surface::{ERROR, LANES, Surface, VertexNormal};
 use crate::vector::{Rigid, Vec3, dot, scale};
 use fearless_simd::{Simd, prelude::*};
+use lists::{Group, Looks};
+
+pub(super) use lists::Scratch;
+
+/// No foot.
+const NONE: u32 = u32::MAX;
+/// So far away that nothing is near, but with a square that is a number.
+const NOWHERE: f32 = 1e15;
 
 /// Where the vertices of one surface look for their feet on the other.
 struct Search<'a, S> {
@@ -26,61 +36,6 @@ struct Search<'a, S> {
     /// Rounding of a distance within the tolerance, to which that of a block is added, metres.
     error: f32,
 }
-
-/// Memory of the search, kept to be reused. A batch of vertices is searched for at once, as many in a group as there are lanes, each in a
-/// slot of its own.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Scratch {
-    groups: Vec<Group>,
-    /// By group and leaf of its neighbourhood: lower bounds of the squared distances.
-    lowers: Vec<[f32; LANES]>,
-    /// By slot; places beyond the last vertex of a group are not used.
-    points: Vec<[Vec3; LANES]>,
-    /// The closest triangle is not farther than this; zero for a vertex that has none within the tolerance.
-    within: Vec<[f32; LANES]>,
-    /// The leaf to look in first.
-    guesses: Vec<[u32; LANES]>,
-    /// The closest foot so far, and its distance.
-    best: Vec<[u32; LANES]>,
-    distances: Vec<[f64; LANES]>,
-    /// Which slots look in which leaves: first each where it may be closest, then wherever else it must.
-    looks: Looks,
-    /// Which triangles may be the closest, by slot, and the feet on them.
-    candidates: Candidates,
-    feet: Vec<Foot>,
-}
-
-/// Vertices of one leaf, numbered in a row.
-#[derive(Clone, Copy, Debug)]
-struct Group {
-    first_vertex: u32,
-    /// Its neighbourhood, a range of the near leaves.
-    begin: u32,
-    end: u32,
-}
-
-/// Lists with room for more than is in use, so that whole lanes can be written.
-#[derive(Clone, Debug, Default)]
-struct Looks {
-    count: usize,
-    slot: Vec<u32>,
-    leaf: Vec<u32>,
-    /// Squared distances of the triangles, and how certain these are.
-    squared: Vec<[f32; LANES]>,
-    error: Vec<f32>,
-}
-
-#[derive(Clone, Debug, Default)]
-struct Candidates {
-    count: usize,
-    slot: Vec<u32>,
-    triangle: Vec<u32>,
-}
-
-/// No foot.
-const NONE: u32 = u32::MAX;
-/// So far away that nothing is near, but with a square that is a number.
-const NOWHERE: f32 = 1e15;
 
 /// Gives every vertex of the body within the tolerance its signed distance, and makes its contact.
 #[inline(always)]
@@ -181,48 +136,6 @@ fn run<S: Simd>(
             }
         }
         scratch.forget();
-    }
-}
-
-impl Scratch {
-    /// Makes room for the next batch.
-    #[inline(always)]
-    fn forget(&mut self) {
-        self.groups.clear();
-        self.lowers.clear();
-        self.points.clear();
-        self.within.clear();
-        self.guesses.clear();
-        self.best.clear();
-        self.distances.clear();
-        self.looks.count = 0;
-        self.candidates.count = 0;
-        self.feet.clear();
-    }
-}
-
-impl Looks {
-    /// Makes sure that `more` can be appended.
-    #[inline(always)]
-    fn expect(&mut self, more: usize) {
-        if self.slot.len() < self.count + more {
-            let room = 2 * (self.count + more);
-            self.slot.resize(room, 0);
-            self.leaf.resize(room, 0);
-            self.squared.resize(room, [0.0; LANES]);
-            self.error.resize(room, 0.0);
-        }
-    }
-}
-
-impl Candidates {
-    #[inline(always)]
-    fn expect(&mut self, more: usize) {
-        if self.slot.len() < self.count + more {
-            let room = 2 * (self.count + more);
-            self.slot.resize(room, 0);
-            self.triangle.resize(room, 0);
-        }
     }
 }
 
