@@ -8,23 +8,23 @@ use crate::vector::Vec3;
 /// slot of its own.
 #[derive(Clone, Debug, Default)]
 pub(in crate::query) struct Scratch {
-    pub groups: Vec<Group>,
+    pub(super) groups: Vec<Group>,
     /// By group and leaf of its neighbourhood: lower bounds of the squared distances.
-    pub lowers: Vec<[f32; LANES]>,
+    pub(super) lowers: Vec<[f32; LANES]>,
     /// By slot; places beyond the last vertex of a group are not used.
-    pub points: Vec<[Vec3; LANES]>,
+    pub(super) points: Vec<[Vec3; LANES]>,
     /// The closest triangle is not farther than this; zero for a vertex that has none within the tolerance.
-    pub within: Vec<[f32; LANES]>,
+    pub(super) within: Vec<[f32; LANES]>,
     /// The leaf to look in first.
-    pub guesses: Vec<[u32; LANES]>,
+    pub(super) guesses: Vec<[u32; LANES]>,
     /// The closest foot so far, and its distance.
-    pub best: Vec<[u32; LANES]>,
-    pub distances: Vec<[f64; LANES]>,
+    pub(super) best: Vec<[u32; LANES]>,
+    pub(super) distances: Vec<[f64; LANES]>,
     /// Which slots look in which leaves: first each where it may be closest, then wherever else it must.
-    pub looks: Looks,
+    pub(super) looks: Looks,
     /// Which triangles may be the closest, by slot, and the feet on them.
-    pub candidates: Candidates,
-    pub feet: Vec<Foot>,
+    pub(super) candidates: Candidates,
+    pub(super) feet: Vec<Foot>,
 }
 
 /// Vertices of one leaf, numbered in a row.
