@@ -14,7 +14,7 @@ const LARGE: f64 = 96.0;
 const SMALL_AGAIN: f64 = 0.5;
 /// Where surfaces move by this share of the tolerance from query to query, contacts are large that have as many vertices more as a front has samples in contact; by twice
 /// that share, four times as many.
-const FAST: f64 = 0.03;
+const FAST: f64 = 0.022;
 /// Deeper than this share of the tolerance a contact is exact, until it is less deep than that one: a front shows nothing that is deeper than
 /// the tolerance, and a hard push must not go through.
 const DEEP: f64 = 0.5;
