@@ -32,7 +32,7 @@ pub(super) fn coarse_nodes<S: Simd>(simd: S, node: &Node, extent: f32) -> LaneMa
     own.simd_gt(extent) & nodes(simd, node)
 }
 
-/// Eight boxes with slabs, by axis and lane.
+/// Boxes with slabs, by axis and lane.
 pub(super) struct Boxes<'a> {
     pub min: [&'a [f32; LANES]; 3],
     pub max: [&'a [f32; LANES]; 3],

@@ -159,7 +159,7 @@ impl QueryWorkspace {
         obstacle.clear();
         let (near, touching) = (&walk.near, &walk.touching);
         // There rarely are more, and a first query need not copy what it has found again and again.
-        contacts.reserve(2 * (near.body.of.len() + near.obstacle.of.len()));
+        contacts.reserve(4 * (near.body.of.len() + near.obstacle.of.len()));
         let mut sink = Sink { pair, world_from_obstacle, contacts, least: f64::INFINITY };
         vertices::of_body(simd, pair, &near.body, body, scratch, &mut sink);
         vertices::of_obstacle(simd, pair, &near.obstacle, obstacle, scratch, &mut sink);

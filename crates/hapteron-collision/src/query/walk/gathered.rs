@@ -1,4 +1,4 @@
-//! Leaves of the obstacle gathered for the leaves of one node of the body, which are then held against eight of them at a time.
+//! Leaves of the obstacle gathered for the leaves of one node of the body, which are then held against a block of them at a time.
 
 use super::super::bounds::{Bounds, Boxes, Slab};
 use super::super::kernel::{LaneMask, LaneNumbers, Lanes, bits, lanes};
@@ -8,12 +8,12 @@ use super::lists::List;
 use crate::surface::{LANES, Node};
 use fearless_simd::{Simd, prelude::*};
 
-/// Eights in one piece.
-const EIGHTS: usize = 5;
-/// No more leaves than this in one, so that eight lanes more can be written behind them.
-const FULL: usize = LANES * (EIGHTS - 1);
+/// Blocks of as many leaves as there are lanes, in one piece.
+const BLOCKS: usize = 5;
+/// No more leaves than this in one, so that a block more can be written behind them.
+const FULL: usize = LANES * (BLOCKS - 1);
 
-type Row = [[f32; LANES]; EIGHTS];
+type Row = [[f32; LANES]; BLOCKS];
 
 /// A number of leaves, by row.
 #[derive(Clone, Debug)]
@@ -24,20 +24,20 @@ struct Piece {
     normal: [Row; 3],
     low: Row,
     high: Row,
-    leaf: [[u32; LANES]; EIGHTS],
+    leaf: [[u32; LANES]; BLOCKS],
     count: usize,
 }
 
 impl Piece {
     const EMPTY: Self = {
-        let row = [[0.0; LANES]; EIGHTS];
+        let row = [[0.0; LANES]; BLOCKS];
         Self {
             min: [row; 3],
             max: [row; 3],
             normal: [row; 3],
             low: row,
             high: row,
-            leaf: [[0; LANES]; EIGHTS],
+            leaf: [[0; LANES]; BLOCKS],
             count: 0,
         }
     };
@@ -100,7 +100,7 @@ impl Gathered {
         self.used += 1;
     }
 
-    /// Fills the last eight up with lanes that are far from everything.
+    /// Fills the last block up with lanes that are far from everything.
     #[inline(always)]
     pub(super) fn finish<S: Simd>(&mut self, simd: S) {
         let piece = &mut self.pieces[self.used - 1];
@@ -135,9 +135,9 @@ impl Gathered {
     ) {
         for piece in &self.pieces[..self.used] {
             piece.choose(simd, corners, slab, margins.near, close);
-            for eight in 0..close.count.div_ceil(LANES).min(EIGHTS) {
-                let gap = close.gap(simd, eight, corners);
-                let leaves = LaneNumbers::load_array_ref(simd, &close.leaf[eight]);
+            for block in 0..close.count.div_ceil(LANES).min(BLOCKS) {
+                let gap = close.gap(simd, block, corners);
+                let leaves = LaneNumbers::load_array_ref(simd, &close.leaf[block]);
                 near.append(leaves, gap.simd_le(margins.near));
                 touching.append(leaves, gap.simd_le(margins.touching));
             }
@@ -152,13 +152,13 @@ fn put<S: Simd>(simd: S, row: &mut Row, begin: usize, values: &[f32; LANES], mas
 
 impl Piece {
     #[inline(always)]
-    fn boxes(&self, eight: usize) -> Boxes<'_> {
+    fn boxes(&self, block: usize) -> Boxes<'_> {
         Boxes {
-            min: [&self.min[0][eight], &self.min[1][eight], &self.min[2][eight]],
-            max: [&self.max[0][eight], &self.max[1][eight], &self.max[2][eight]],
-            normal: [&self.normal[0][eight], &self.normal[1][eight], &self.normal[2][eight]],
-            low: &self.low[eight],
-            high: &self.high[eight],
+            min: [&self.min[0][block], &self.min[1][block], &self.min[2][block]],
+            max: [&self.max[0][block], &self.max[1][block], &self.max[2][block]],
+            normal: [&self.normal[0][block], &self.normal[1][block], &self.normal[2][block]],
+            low: &self.low[block],
+            high: &self.high[block],
         }
     }
 
@@ -166,16 +166,16 @@ impl Piece {
     #[inline(always)]
     fn choose<S: Simd>(&self, simd: S, corners: &Corners, slab: &Slab, margin: f32, close: &mut Close) {
         let mut count = 0;
-        for eight in 0..self.count.div_ceil(LANES).min(EIGHTS) {
-            let gap = self.gap(simd, eight, corners, slab);
+        for block in 0..self.count.div_ceil(LANES).min(BLOCKS) {
+            let gap = self.gap(simd, block, corners, slab);
             let mask = gap.simd_le(margin);
             for k in 0..3 {
-                put(simd, &mut close.normal[k], count, &self.normal[k][eight], mask);
+                put(simd, &mut close.normal[k], count, &self.normal[k][block], mask);
             }
-            put(simd, &mut close.low, count, &self.low[eight], mask);
-            put(simd, &mut close.high, count, &self.high[eight], mask);
+            put(simd, &mut close.low, count, &self.low[block], mask);
+            put(simd, &mut close.high, count, &self.high[block], mask);
             gap.compress(mask).store_slice(&mut close.gap.as_flattened_mut()[count..count + LANES]);
-            let leaves = LaneNumbers::load_array_ref(simd, &self.leaf[eight]);
+            let leaves = LaneNumbers::load_array_ref(simd, &self.leaf[block]);
             leaves.compress(mask).store_slice(&mut close.leaf.as_flattened_mut()[count..count + LANES]);
             count = (count + bits(mask).count_ones() as usize).min(FULL);
         }
@@ -183,13 +183,13 @@ impl Piece {
         close.count = count;
     }
 
-    /// Lower bounds of the distances of a leaf of the body to eight leaves by its box and slab; negative where they may overlap.
+    /// Lower bounds of the distances of a leaf of the body to the leaves of a block by its box and slab; negative where they may overlap.
     #[inline(always)]
-    fn gap<S: Simd>(&self, simd: S, eight: usize, corners: &Corners, slab: &Slab) -> Lanes<S> {
+    fn gap<S: Simd>(&self, simd: S, block: usize, corners: &Corners, slab: &Slab) -> Lanes<S> {
         let mut gap = Lanes::splat(simd, f32::NEG_INFINITY);
         let (mut middle, mut reach) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 0.0));
         for k in 0..3 {
-            let (min, max) = (lanes(simd, &self.min[k][eight]), lanes(simd, &self.max[k][eight]));
+            let (min, max) = (lanes(simd, &self.min[k][block]), lanes(simd, &self.max[k][block]));
             gap = gap.max(min - corners.max[k]).max(Lanes::splat(simd, corners.min[k]) - max);
             middle += (min + max) * (0.5 * slab.normal[k]);
             reach += (max - min) * (0.5 * slab.normal[k].abs());
@@ -207,25 +207,25 @@ pub(super) struct Close {
     high: Row,
     /// Lower bound of the distance.
     gap: Row,
-    leaf: [[u32; LANES]; EIGHTS],
+    leaf: [[u32; LANES]; BLOCKS],
     count: usize,
 }
 
 impl Default for Close {
     fn default() -> Self {
-        let row = [[0.0; LANES]; EIGHTS];
-        Self { normal: [row; 3], low: row, high: row, gap: row, leaf: [[0; LANES]; EIGHTS], count: 0 }
+        let row = [[0.0; LANES]; BLOCKS];
+        Self { normal: [row; 3], low: row, high: row, gap: row, leaf: [[0; LANES]; BLOCKS], count: 0 }
     }
 }
 
 impl Close {
-    /// Lower bounds of the distances that allow for the slabs of eight leaves.
+    /// Lower bounds of the distances that allow for the slabs of the leaves of a block.
     #[inline(always)]
-    fn gap<S: Simd>(&self, simd: S, eight: usize, corners: &Corners) -> Lanes<S> {
+    fn gap<S: Simd>(&self, simd: S, block: usize, corners: &Corners) -> Lanes<S> {
         let [x, y, z] = &self.normal;
-        let normal = [lanes(simd, &x[eight]), lanes(simd, &y[eight]), lanes(simd, &z[eight])];
+        let normal = [lanes(simd, &x[block]), lanes(simd, &y[block]), lanes(simd, &z[block])];
         let [low, high] = corners.heights(simd, normal);
-        let gap = lanes(simd, &self.gap[eight]);
-        gap.max(low - lanes(simd, &self.high[eight])).max(lanes(simd, &self.low[eight]) - high)
+        let gap = lanes(simd, &self.gap[block]);
+        gap.max(low - lanes(simd, &self.high[block])).max(lanes(simd, &self.low[block]) - high)
     }
 }

@@ -26,7 +26,7 @@ pub(in crate::query) struct Pairs {
     pub obstacle: Neighbours,
 }
 
-/// The end of a list of near leaves that grows by up to eight at a time.
+/// The end of a list of near leaves that grows by up to as many as there are lanes at a time.
 pub(super) struct List<'a> {
     near: &'a mut [u32],
     pub len: usize,
