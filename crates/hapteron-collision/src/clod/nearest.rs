@@ -1,7 +1,12 @@
 //! The closest triangle of a surface to a point.
 
-use crate::surface::{EMPTY, LANES, LEAF, Leaf, Node, Surface};
+use crate::query::kernel::{at_most, least, point_triangles};
+use crate::surface::{EMPTY, ERROR, LANES, LEAF, Node, Surface};
 use crate::vector::{Vec3, add, dot, norm, scale, sub};
+use fearless_simd::Level;
+
+/// Covers the rounding of squares in single precision.
+const ROUNDING: f32 = 1.0 + 1e-6;
 
 /// No leaf, no triangle.
 pub(crate) const NOWHERE: u32 = u32::MAX;
@@ -22,8 +27,9 @@ impl Nearest {
         self.squared = limit * limit;
         self.triangle = NOWHERE;
         self.leaf = NOWHERE;
+        let level = Level::new();
         if guess != NOWHERE {
-            self.look(surface, guess, p);
+            self.look(level, surface, guess, p);
         }
         let p32 = p.map(|c| c as f32);
         self.stack.clear();
@@ -39,7 +45,7 @@ impl Nearest {
                 if leaf != guess
                     && !misses_slab(surface, leaf, p, slack, self.squared.sqrt() as f32 * (1.0 + 1e-6))
                 {
-                    self.look(surface, leaf, p);
+                    self.look(level, surface, leaf, p);
                 }
                 continue;
             }
@@ -67,13 +73,25 @@ impl Nearest {
         self.triangle != NOWHERE
     }
 
+    /// Looks at those triangles of a leaf that may be closer, for all that single precision says; the first of equals counts.
     #[inline(always)]
-    fn look(&mut self, surface: &Surface, leaf: u32, p: Vec3) {
-        let (squared, lane) = point_leaf(p, surface, &surface.leaves[leaf as usize]);
-        if squared < self.squared {
-            self.squared = squared;
-            self.triangle = surface.leaves[leaf as usize].triangle(lane);
-            self.leaf = leaf;
+    fn look(&mut self, level: Level, surface: &Surface, leaf: u32, p: Vec3) {
+        let (own, block) = (&surface.leaves[leaf as usize], &surface.blocks[leaf as usize]);
+        let local = [0, 1, 2].map(|k| (p[k] - f64::from(block.origin[k])) as f32);
+        let squared = point_triangles(level, local, block);
+        let nearest = least(&squared).sqrt() * (1.0 + ERROR) + block.error;
+        let within = nearest.min((self.squared.sqrt() as f32).next_up());
+        let reach = within * (1.0 + ERROR) + block.error;
+        let mut mask = at_most(&squared, reach * reach * ROUNDING) & ((1 << own.triangles) - 1);
+        while mask != 0 {
+            let triangle = own.first_triangle + mask.trailing_zeros();
+            mask &= mask - 1;
+            let [a, b, c] =
+                surface.triangles[triangle as usize].map(|v| sub(surface.vertices[v as usize], p));
+            let squared = point_triangle(sub(b, a), sub(c, a), scale(a, -1.0));
+            if squared < self.squared {
+                (self.squared, self.triangle, self.leaf) = (squared, triangle, leaf);
+            }
         }
     }
 }
@@ -117,34 +135,6 @@ pub(crate) fn box_distances(node: &Node, p: [f32; 3], slack: f32) -> [f32; LANES
     squared
 }
 
-/// Least squared distance to the triangles of a leaf and its lane, the first of equals: by region as in Ericson,
-/// Real-Time Collision Detection, 5.1.5, with the choice of region as selections, so that all lanes run side by side.
-#[inline(always)]
-fn point_leaf(p: Vec3, surface: &Surface, leaf: &Leaf) -> (f64, usize) {
-    let mut corners = [[[0.0; LANES]; 3]; 3];
-    for l in 0..LANES {
-        let triangle = surface.triangles[leaf.triangle(l) as usize];
-        for (corner, v) in corners.iter_mut().zip(triangle) {
-            let v = surface.vertices[v as usize];
-            for k in 0..3 {
-                corner[k][l] = v[k] - p[k];
-            }
-        }
-    }
-    let mut squared = [0.0; LANES];
-    for l in 0..LANES {
-        let [a, b, c] = corners.map(|corner| [corner[0][l], corner[1][l], corner[2][l]]);
-        squared[l] = point_triangle(sub(b, a), sub(c, a), scale(a, -1.0));
-    }
-    let mut lane = 0;
-    for l in 1..LANES {
-        if squared[l] < squared[lane] {
-            lane = l;
-        }
-    }
-    (squared[lane], lane)
-}
-
 /// Squared distance of the point `ap` to the triangle 0, `ab`, `ac`.
 #[inline(always)]
 fn point_triangle(ab: Vec3, ac: Vec3, ap: Vec3) -> f64 {
@@ -152,7 +142,8 @@ fn point_triangle(ab: Vec3, ac: Vec3, ap: Vec3) -> f64 {
     dot(e, e)
 }
 
-/// The way to the point `ap` from the closest point of the triangle 0, `ab`, `ac`.
+/// The way to the point `ap` from the closest point of the triangle 0, `ab`, `ac`: by region as in Ericson, Real-Time Collision Detection, 5.1.5,
+/// with the choice of region as selections, so that several can be found side by side.
 #[inline(always)]
 pub(crate) fn from_triangle(ab: Vec3, ac: Vec3, ap: Vec3) -> Vec3 {
     let (d1, d2) = (dot(ab, ap), dot(ac, ap));
