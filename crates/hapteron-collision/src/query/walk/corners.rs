@@ -7,6 +7,7 @@ use fearless_simd::{Simd, f32x8, f64x4, prelude::*};
 
 /// A leaf's triangles have no more corners than this.
 const MOST: usize = 3 * LANES;
+
 /// A rigid motion by its columns.
 #[derive(Clone, Copy)]
 pub(super) struct Columns<S: Simd> {
