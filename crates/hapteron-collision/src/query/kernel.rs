@@ -24,6 +24,18 @@ pub(super) fn lanes_of<S: Simd, const N: usize>(simd: S, values: &[[f32; LANES];
     )
 }
 
+/// A vector in all lanes.
+#[inline(always)]
+pub(super) fn splat<S: Simd>(simd: S, v: [f32; 3]) -> [Lanes<S>; 3] {
+    [Lanes::splat(simd, v[0]), Lanes::splat(simd, v[1]), Lanes::splat(simd, v[2])]
+}
+
+/// Scalar products, lane by lane.
+#[inline(always)]
+pub(super) fn dot<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> Lanes<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
 /// One bit a lane.
 #[inline(always)]
 pub(super) fn bits<S: Simd>(mask: LaneMask<S>) -> u32 {

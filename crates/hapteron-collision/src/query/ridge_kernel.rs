@@ -1,7 +1,7 @@
 //! The inner loops over edges, sixteen at a time; like those of the kernel, but in single precision throughout: what they
 //! let through is looked at again exactly, and what they refuse is certain.
 
-use super::kernel::{Lanes, bits, lanes, lanes_of};
+use super::kernel::{Lanes, bits, dot, lanes, lanes_of, splat};
 use super::ridge_store::RidgeBlock;
 use crate::surface::{Cone, LANES, Leaf};
 use fearless_simd::{Simd, prelude::*};
@@ -207,19 +207,6 @@ pub(super) fn meeting<S: Simd>(
 #[inline(always)]
 fn pick<S: Simd>(simd: S, values: &[[f32; LANES]; 3], lane: usize) -> [Lanes<S>; 3] {
     splat(simd, [values[0][lane], values[1][lane], values[2][lane]])
-}
-
-#[inline(always)]
-fn splat<S: Simd>(simd: S, v: [f32; 3]) -> [Lanes<S>; 3] {
-    core::array::from_fn(
-        #[inline(always)]
-        |k| Lanes::splat(simd, v[k]),
-    )
-}
-
-#[inline(always)]
-fn dot<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> Lanes<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]

@@ -17,8 +17,6 @@ pub(super) use lists::Scratch;
 
 /// No foot.
 const NONE: u32 = u32::MAX;
-/// So far away that nothing is near, but with a square that is a number.
-const NOWHERE: f32 = 1e15;
 
 /// Where the vertices of one surface look for their feet on the other.
 struct Search<'a, S> {
@@ -155,11 +153,12 @@ fn groups_of_leaf<S: Simd>(
     let limit = within * within * ROUNDING;
     let own = &search.own.leaves[leaf as usize];
     let mut closest = Lanes::splat(simd, f32::INFINITY);
+    let numbers = LaneNumbers::load_array_ref(simd, &kernel::NUMBERS);
     let all = &search.own.vertices[own.first_vertex as usize..][..usize::from(own.vertices)];
     for (group, vertices) in all.chunks(LANES).enumerate() {
         let first_vertex = own.first_vertex + (group * LANES) as u32;
         let mut points = [[0.0; 3]; LANES];
-        let mut at = [[NOWHERE; LANES]; 3];
+        let mut at = [[0.0; LANES]; 3];
         for (lane, &vertex) in vertices.iter().enumerate().take(LANES) {
             let point = search.motion.point(vertex);
             points[lane] = point;
@@ -177,6 +176,8 @@ fn groups_of_leaf<S: Simd>(
             least = least.min(lower);
             scratch.lowers.push(lower.to_array());
         }
+        let filled = numbers.simd_lt(vertices.len() as u32);
+        let least = filled.select(least, Lanes::splat(simd, f32::INFINITY));
         closest = closest.min(least);
         let probes = least.simd_lt(limit);
         if probes.all_false() {
@@ -187,8 +188,7 @@ fn groups_of_leaf<S: Simd>(
         let last = side.last_leaves(first_vertex, vertices.len());
         let last = LaneNumbers::load_array_ref(simd, &last);
         let guess = last.simd_gt(0).select(last - 1, guess);
-        let slots =
-            LaneNumbers::load_array_ref(simd, &kernel::NUMBERS) + (scratch.groups.len() * LANES) as u32;
+        let slots = numbers + (scratch.groups.len() * LANES) as u32;
         let looks = &mut scratch.looks;
         looks.expect(LANES);
         kernel::append(&mut looks.slot, looks.count, slots, probes);

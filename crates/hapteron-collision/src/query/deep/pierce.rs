@@ -4,8 +4,8 @@
 //! between is looked at again exactly.
 
 use super::edges::Edges;
-use super::segments::{Frame, Moved, ROOM, Rows, Segments, dot, splat};
-use crate::query::kernel::{Lanes, bits, lanes, lanes_of};
+use super::segments::{Frame, Moved, ROOM, Rows, Segments};
+use crate::query::kernel::{Lanes, bits, dot, lanes, lanes_of, splat};
 use crate::query::side::Side;
 use crate::surface::{LANES, TriangleBlock};
 use fearless_simd::{Simd, prelude::*};

@@ -1,7 +1,7 @@
 //! Edges in the other surface's frame: those of a leaf that may run through a face, and what of them.
 
 use super::edges::{EdgeBlock, Edges, edges_of, filled};
-use crate::query::kernel::{LaneMask, LaneNumbers, Lanes, NUMBERS, bits, lanes, lanes_of};
+use crate::query::kernel::{LaneMask, LaneNumbers, Lanes, NUMBERS, bits, dot, lanes, lanes_of, splat};
 use crate::query::side::Side;
 use crate::surface::{LANES, Leaf, Surface};
 use crate::vector::Rigid;
@@ -268,14 +268,4 @@ fn distances(edges: &Edges, places: &[u32; LANES]) -> [f32; LANES] {
         result[lane] = edges.distance(places[lane]);
     }
     result
-}
-
-#[inline(always)]
-pub(super) fn splat<S: Simd>(simd: S, v: [f32; 3]) -> [Lanes<S>; 3] {
-    [Lanes::splat(simd, v[0]), Lanes::splat(simd, v[1]), Lanes::splat(simd, v[2])]
-}
-
-#[inline(always)]
-pub(super) fn dot<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> Lanes<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
